@@ -1,0 +1,56 @@
+/* Build options: the number type and the limits.
+ *
+ * Set them on the compiler's command line, or in a file of your own named by
+ * -DJL_CONFIG_FILE='"my_config.h"', alike for the library and for its users.
+ * A library and a program that disagree about the number type do not link.
+ */
+#ifndef JL_CONFIG_H
+#define JL_CONFIG_H
+
+#ifdef JL_CONFIG_FILE
+#include JL_CONFIG_FILE
+#endif
+
+/* 0: jl_real is double.  1: jl_real is float, and no double is touched. */
+#ifndef JL_REAL_FLOAT
+#define JL_REAL_FLOAT 0
+#endif
+#if JL_REAL_FLOAT != 0 && JL_REAL_FLOAT != 1
+#error "JL_REAL_FLOAT is 0 (double) or 1 (float)"
+#endif
+
+/* Largest sizes that an init accepts.  They cost nothing by themselves: the
+ * memory is the caller's; they only keep the size products inside an int. */
+#ifndef JL_MAX_STATES
+#define JL_MAX_STATES 64
+#endif
+#if JL_MAX_STATES < 1 || JL_MAX_STATES > 128
+#error "JL_MAX_STATES must be 1 to 128"
+#endif
+
+#ifndef JL_MAX_MODES
+#define JL_MAX_MODES 256
+#endif
+#if JL_MAX_MODES < 1 || JL_MAX_MODES > 1024
+#error "JL_MAX_MODES must be 1 to 1024"
+#endif
+
+/* Processing elements of one run. */
+#ifndef JL_MAX_PES
+#define JL_MAX_PES 16
+#endif
+#if JL_MAX_PES < 1 || JL_MAX_PES > 64
+#error "JL_MAX_PES must be 1 to 64"
+#endif
+
+/* Octets of the largest frame on a datagram carrier: below the 1400 that a
+ * datagram may have before networks cut it into pieces.  Each frame that a
+ * link may have in flight costs this much memory at either end. */
+#ifndef JL_FRAME_MAX
+#define JL_FRAME_MAX 1344
+#endif
+#if JL_FRAME_MAX < 64 || JL_FRAME_MAX > 32767
+#error "JL_FRAME_MAX must be 64 to 32767"
+#endif
+
+#endif

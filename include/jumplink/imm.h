@@ -1,0 +1,138 @@
+/* The interacting multiple model filter (IMM): M Kalman filters, one a mode,
+ * that exchange their estimates before every step in proportion to the
+ * probability of the jumps between their modes.
+ * (Blom, Bar-Shalom 1988; Pan, Dai, Zhang 1997, eq. 5-20, misprints mended.)
+ *
+ *     mix       c_j   = sum_i Pi[i][j] mu_i
+ *               mu_ij = Pi[i][j] mu_i / c_j
+ *               x0_j  = sum_i mu_ij x_i
+ *               P0_j  = sum_i mu_ij (P_i + (x_i - x0_j)(x_i - x0_j)')
+ *     filter    x_j, P_j, l_j = predict and update of mode j from x0_j, P0_j
+ *     weigh     log mu_j = log c_j + l_j - loglik
+ *               loglik   = log sum_j exp(log c_j + l_j)
+ *     combine   xhat = sum_j mu_j x_j
+ *               Phat = sum_j mu_j (P_j + (x_j - xhat)(x_j - xhat)')
+ *
+ * Probabilities are kept as logarithms: a measurement 1000 sigma away from
+ * every mode, or a mode that was improbable for an hour, does no harm.  A mode
+ * that cannot be entered (c_j = 0) keeps its own estimate unmixed.
+ *
+ * Mixing costs O(M^2 n^2).  If Pi = diag(lambda) + 1 v' with lambda >= 0 (stay
+ * with probability p, else anywhere alike; any 2 x 2 chain with Pi00 + Pi11
+ * >= 1) mode j pools only its own estimate and the combined one, O(M n^2):
+ *               c_j  = lambda_j mu_j + v_j,  a = lambda_j mu_j / c_j,
+ *               b    = v_j / c_j,            d = x_j - xhat
+ *               x0_j = a x_j + b xhat,  P0_j = a P_j + b Phat + a b d d'
+ * Equal in exact arithmetic; found out by jl_imm_chain.
+ *
+ * A step computes into a second set of estimates, and weigh, the last stage
+ * that changes the filter's state, makes it the valid one.  So on any error
+ * the filter is as it was before the step.
+ */
+#ifndef JL_IMM_H
+#define JL_IMM_H
+
+#include "base.h"
+#include "kf.h"
+#include "model.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum {                          /* how to mix */
+    JL_MIX_AUTO = 0,            /* sticky where the chain allows it         */
+    JL_MIX_GENERAL = 1          /* always the general sums                  */
+};
+
+/* Reals of state: two sets of estimates of M modes, the combined estimate,
+ * Pi, and nine vectors over the modes. */
+#define JL_IMM_STATE(M, n) \
+    (2 * (M) * ((n) + (n) * (n)) + (n) + (n) * (n) + (M) * (M) + 9 * (M))
+#define JL_IMM_SCRATCH(M, n, m) (JL_KF_SCRATCH(n, m) + (M) + (n))
+
+typedef struct jl_imm {
+    int M, n, m;
+    const jl_mode *modes;       /* [M]                                      */
+    const jl_kf_form *form;
+    int mixing;                 /* JL_MIX_...                               */
+    int sticky;                 /* Pi = diag(lambda) + 1 v' is used         */
+    int stage;                  /* what may come next; see the calls        */
+    int combined;               /* xhat, Phat belong to the present state   */
+
+    /* the state: valid between steps */
+    jl_real *x;                 /* [M,n]                                    */
+    jl_real *P;                 /* [M,n,n]                                  */
+    jl_real *logmu;             /* [M]                                      */
+    jl_real *mu;                /* [M] exp(logmu)                           */
+
+    /* results of combine and weigh */
+    jl_real *xhat;              /* [n]                                      */
+    jl_real *Phat;              /* [n,n]                                    */
+    jl_real loglik;             /* of the last measurement                  */
+
+    /* the step under way: mixed, then predicted, then updated */
+    jl_real *xw;                /* [M,n]                                    */
+    jl_real *Pw;                /* [M,n,n]                                  */
+    jl_real *logc;              /* [M] predicted log-probabilities          */
+    jl_real *c;                 /* [M] exp(logc)                            */
+    jl_real *l;                 /* [M] log-likelihoods                      */
+    jl_real *e;                 /* [M] work                                 */
+
+    /* the chain */
+    jl_real *Pi;                /* [M,M]                                    */
+    jl_real *lambda;            /* [M]                                      */
+    jl_real *v;                 /* [M]                                      */
+} jl_imm;
+
+/* Bind a filter to its modes, form and memory: modes [M] of equal n and m,
+ * mem [cap] reals, cap >= JL_IMM_STATE(M, n); all outlive the filter.  Pi is
+ * the identity, mu uniform, x = 0, P = I in every mode.
+ * Returns JL_OK, JL_EDIM (M outside 1..JL_MAX_MODES, unequal sizes, mixing),
+ * JL_ENOMEM; *imm is untouched on error. */
+int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
+                const jl_kf_form *form, int mixing, jl_real *mem, int cap);
+
+/* Set the chain: Pi [M,M], rows sum to 1 (copied).  May be called between any
+ * two steps, so a chain that depends on the time step is set before each.
+ * Returns JL_OK, JL_ENONFINITE, JL_EPROB; unchanged on error. */
+int jl_imm_chain(jl_imm *imm, const jl_real *Pi);
+
+/* Set the state: x [M,n], P [M,n,n], mu [M] (copied); scratch
+ * [JL_IMM_SCRATCH(M, n, m)].  A probability of 0 is allowed.
+ * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF, JL_EPROB; unchanged on
+ * error. */
+int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,
+               const jl_real *mu, jl_real *scratch);
+
+/* One step: mix, filter, weigh, combine.  z [m], or NULL for a missing
+ * measurement: the modes are only predicted, log mu = log c, loglik = 0.
+ * Returns JL_OK, or the code of the first mode that failed: JL_ENONFINITE,
+ * JL_ESINGULAR; the filter is then as before the step. */
+int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch);
+
+/* The four stages, in this order; mix may be called at any time and starts the
+ * step anew; combine combines the present state and may be called at any time.
+ * Returns: as jl_imm_step, and JL_EORDER for filter without mix, or weigh
+ * without filter. */
+int jl_imm_mix(jl_imm *imm, jl_real *scratch);
+int jl_imm_filter(jl_imm *imm, const jl_real *z, jl_real *scratch);
+int jl_imm_weigh(jl_imm *imm);
+void jl_imm_combine(jl_imm *imm);
+
+/* The pieces of mix and filter, for filters spread over several processors:
+ * mix = foresee, then mix_mode for every j; filter = predict_mode and
+ * update_mode for every j.  A processor does so for the modes it owns; l[j],
+ * xw[j], Pw[j] of the others come to it by message; then it calls weigh.
+ * foresee computes c of all modes from mu of all modes; mix_mode, predict_mode
+ * and update_mode leave their result in xw[j], Pw[j], and l[j]. */
+void jl_imm_foresee(jl_imm *imm);
+void jl_imm_mix_mode(jl_imm *imm, int j, jl_real *scratch);
+int jl_imm_predict_mode(jl_imm *imm, int j, jl_real *scratch);
+int jl_imm_update_mode(jl_imm *imm, int j, const jl_real *z,
+                       jl_real *scratch);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

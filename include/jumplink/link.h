@@ -1,0 +1,139 @@
+/* Links: two channels, one each way, between two PEs over a carrier that
+ * loses, doubles, reorders or damages datagrams.
+ *
+ * A link is an object without I/O and without a clock: datagrams that came in
+ * are given to it, datagrams to go out are taken from it, and the time is an
+ * argument.  So a port for a new carrier is a loop around jl_link_input and
+ * jl_link_output, and a test can run a day of losses in a second.
+ *
+ * Protocol (frames: wire.h, src/wire/WIRE.md).  A message is cut into pieces
+ * that fit a frame; pieces are numbered from 0; up to `window` are under way;
+ * the receiver takes them in order only and acknowledges by the number of the
+ * next piece it waits for, on data that goes back anyway or, after ack_us or
+ * half a window, in a frame of its own.  What is not acknowledged in time
+ * (rto_us, doubled up to 16 times) is sent again.
+ *
+ * Sessions.  Each end has a session number, new for every start of the
+ * program.  HELLO frames tell it to the other end, and the link is up only
+ * when a frame has shown that the other end knows ours: a recorded frame, or
+ * one of an earlier life of the other end, never can.  When the other end is
+ * shown to have restarted, the link fails with JL_EPEER: what was under way
+ * cannot be known to have arrived.
+ *
+ * Times are unsigned microseconds modulo 2^32 of any clock that does not go
+ * back; only differences count, so the wrap after 71 minutes is harmless.
+ */
+#ifndef JL_LINK_H
+#define JL_LINK_H
+
+#include "base.h"
+#include "wire.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct jl_link_config {
+    int number;                 /* octets of a real in the messages: 8 or 4 */
+    int from, to;               /* this end and the other: 0 to 255         */
+    jl_u32 session;             /* this end's, not 0, new for every start   */
+    int max_len;                /* octets of the longest message, >= 0      */
+    int slots;                  /* longest messages held each way, >= 1     */
+    jl_u32 rto_us;              /* first retransmission time, say 20000     */
+    jl_u32 ack_us;              /* longest wait with an acknowledgement     */
+} jl_link_config;
+
+/* What happened on a link, counted since init. */
+typedef struct jl_link_count {
+    unsigned long sent;         /* data frames, first transmissions         */
+    unsigned long resent;       /* data frames sent again                   */
+    unsigned long acks;         /* frames that only acknowledge             */
+    unsigned long received;     /* data frames taken                        */
+    unsigned long doubled;      /* data frames that we had already          */
+    unsigned long early;        /* data frames ahead of a lost one: dropped */
+    unsigned long refused;      /* not frames, damaged, of another type     */
+    unsigned long stale;        /* frames of another session                */
+} jl_link_count;
+
+/* One piece of a message in memory: its octets behind room for the header. */
+typedef struct jl_link jl_link;
+
+/* Pieces a message of len octets is cut into, and the window for it. */
+#define JL_LINK_PIECES(max_len) \
+    ((max_len) <= 0 ? 1 : ((max_len) - 1) / JL_FRAME_PAYLOAD + 1)
+
+/* Octets of memory for a link: `slots` longest messages each way. */
+#define JL_LINK_MEM(max_len, slots) \
+    (2 * (slots) * JL_LINK_PIECES(max_len) * (JL_FRAME_MAX + 4))
+
+struct jl_link {
+    jl_link_config config;
+    int window;                 /* pieces held each way                     */
+    unsigned char *out;         /* ring of pieces not acknowledged          */
+    unsigned char *in;          /* ring of pieces not fetched by recv       */
+    jl_u32 peer;                /* the other end's session; 0: unknown      */
+    int up;                     /* both ends know each other                */
+    int failed;                 /* JL_OK, JL_EPEER or JL_ECLOSED            */
+    int closing;                /* we closed: BYE goes out behind the data  */
+    jl_u32 out_first;           /* oldest piece not acknowledged            */
+    jl_u32 out_next;            /* next piece to transmit                   */
+    jl_u32 out_end;             /* behind the last piece handed to us       */
+    jl_u32 out_high;            /* behind the last piece ever transmitted   */
+    jl_u32 in_first;            /* oldest piece not fetched                 */
+    jl_u32 in_next;             /* next piece to arrive                     */
+    jl_u32 timer;               /* when to send again, or HELLO again       */
+    jl_u32 rto_us;              /* the present retransmission time          */
+    jl_u32 ack_timer;           /* when the acknowledgement must go         */
+    int ack_due;                /* pieces not acknowledged yet              */
+    int ack_now;
+    int hello_due;
+    jl_u32 challenger;          /* session of a possible restart; 0: none   */
+    jl_link_count count;
+};
+
+/* Make a link over mem [cap octets], cap >= JL_LINK_MEM(max_len, slots).
+ * Returns JL_OK, JL_EDIM (a field of config out of range), JL_ENOMEM;
+ * *link is untouched on error. */
+int jl_link_init(jl_link *link, const jl_link_config *config,
+                 unsigned char *mem, int cap, jl_u32 now);
+
+/* Take a message to be sent [len].
+ * Returns JL_OK, JL_EAGAIN (no room before more is acknowledged),
+ * JL_ETOOLONG, JL_ECLOSED (either end has closed), JL_EPEER. */
+int jl_link_send(jl_link *link, const unsigned char *msg, int len);
+
+/* Fetch the oldest whole message into msg [cap].
+ * Returns its length, JL_EAGAIN (none yet), JL_ETOOLONG (it stays),
+ * JL_ECLOSED (the other end closed and all is fetched), JL_EPEER. */
+int jl_link_recv(jl_link *link, unsigned char *msg, int cap);
+
+/* Length of the message that recv would return, or recv's error. */
+int jl_link_peek(const jl_link *link);
+
+/* A datagram [len] came from the carrier, at the time now.  Anything may be
+ * in it.  Returns JL_OK if it was of use, or the reason why it was counted
+ * and dropped: a code of jl_frame_decode, JL_EMSG (not for this link),
+ * JL_EPEER (another session). */
+int jl_link_input(jl_link *link, const unsigned char *datagram, int len,
+                  jl_u32 now);
+
+/* The next datagram to give to the carrier now: written to datagram
+ * [JL_FRAME_MAX].  Returns its length, or 0: nothing to send now.  Call until
+ * it returns 0. */
+int jl_link_output(jl_link *link, unsigned char *datagram, jl_u32 now);
+
+/* Microseconds until jl_link_output may have something by time alone: 0 for
+ * now; -1 for not before something comes in or is sent. */
+long jl_link_timer(const jl_link *link, jl_u32 now);
+
+/* Close this end: no more send; what was sent is still delivered. */
+void jl_link_close(jl_link *link);
+
+/* 1 if nothing is under way: all sent pieces are acknowledged, and so are all
+ * received ones, and a close was told to the other end. */
+int jl_link_idle(const jl_link *link);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,75 @@
+/* Dense matrices of run-time size.
+ *
+ * A matrix is a row-major array: A [n,m] has element (i,j) at A[i*m + j].  The
+ * destination comes first; it must not overlap an operand unless it is said
+ * to.  Sizes are >= 1.  Sums run in index order, so results have the same bits
+ * everywhere.  A symmetric result is made symmetric exactly: its upper triangle
+ * is computed and mirrored.  Nothing here fails unless it returns a code.
+ */
+#ifndef JL_MAT_H
+#define JL_MAT_H
+
+#include "base.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* --- products; cost in multiplications --------------------------------- */
+
+/* C = A B           C [n,p]  A [n,m]  B [m,p]                       n m p  */
+void jl_mat_mul(jl_real *C, const jl_real *A, const jl_real *B,
+                int n, int m, int p);
+
+/* C = A B'          C [n,p]  A [n,m]  B [p,m]                       n m p  */
+void jl_mat_mul_t(jl_real *C, const jl_real *A, const jl_real *B,
+                  int n, int m, int p);
+
+/* C = A P A' + Q    C [n,n]  A [n,m]  P [m,m] symmetric, Q [n,n] or NULL
+ * work [n,m].  C may be Q.                             n m m + n (n+1)/2 m */
+void jl_mat_sandwich(jl_real *C, const jl_real *A, const jl_real *P,
+                     const jl_real *Q, jl_real *work, int n, int m);
+
+/* y = A x + b       y [n]  A [n,m]  x [m]  b [n] or NULL; y may be b   n m */
+void jl_mat_apply(jl_real *y, const jl_real *A, const jl_real *x,
+                  const jl_real *b, int n, int m);
+
+/* --- triangular -------------------------------------------------------- */
+
+/* A = L L' by Cholesky: L [n,n] lower, zeros above; A [n,n] symmetric, of
+ * which the lower triangle is read.  L may be A.                    n^3/6
+ * Returns JL_OK, or JL_EDEF if A is not positive definite or not finite
+ * (*L is then undefined). */
+int jl_mat_cholesky(jl_real *L, const jl_real *A, int n);
+
+/* Solve L L' X = B in place: X [n,m] holds B before and X after.   n n m  */
+void jl_mat_cholesky_solve(const jl_real *L, jl_real *X, int n, int m);
+
+/* Solve L y = b in place: y [n] holds b before and y after.       n n / 2  */
+void jl_mat_lower_solve(const jl_real *L, jl_real *y, int n);
+
+/* --- symmetric --------------------------------------------------------- */
+
+/* Packed upper triangle, row by row: p [n(n+1)/2]. */
+#define JL_PACKED(n) ((n) * ((n) + 1) / 2)
+void jl_mat_pack(jl_real *p, const jl_real *A, int n);
+void jl_mat_unpack(jl_real *A, const jl_real *p, int n);
+
+/* --- questions --------------------------------------------------------- */
+
+/* 1 if all n reals are finite and no larger than limit, else 0. */
+int jl_vec_within(const jl_real *v, int n, jl_real limit);
+
+/* Check a covariance A [n,n]: JL_OK, or the first of
+ *     JL_ENONFINITE  an element is NaN, infinite or above JL_LARGE^2
+ *     JL_EASYM       |A_ij - A_ji| > 64 eps sqrt(|A_ii| |A_jj|)
+ *     JL_EDEF        an eigenvalue is negative beyond rounding: Cholesky of
+ *                    the matrix scaled to a unit diagonal meets a pivot below
+ *                    -64 n eps, or a zero row that is not zero
+ * semidefinite is enough; `work` [n,n].                             n^3/6  */
+int jl_mat_check_cov(const jl_real *A, jl_real *work, int n);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,120 @@
+/* Models: what one mode of a jumping system does.
+ *
+ *     x(k+1) = F x(k) + G (w + w_bar),   w ~ N(0, Q)     n states, p noises
+ *     z(k)   = H x(k) + v,               v ~ N(0, R)     m measurements
+ *
+ * given by matrices, or from a catalogue of motions that can be rebuilt for
+ * any time step; and the Markov chain that jumps between the modes.
+ * (Pan, Dai, Zhang 1997, eq. 1-3; F is their Phi, G their Gamma.)
+ */
+#ifndef JL_MODEL_H
+#define JL_MODEL_H
+
+#include "base.h"
+#include "mat.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Reals of memory for a mode: F, H, R, and from G, Q, w_bar only what the
+ * filters need, G Q G' and G w_bar; and G and Q once more for work. */
+#define JL_MODE_MEM(n, m, p) \
+    (2 * (n) * (n) + (n) + (m) * (n) + (m) * (m) + (n) * (p) + (p) * (p))
+
+typedef struct jl_mode {
+    int n, m, p;                /* states, measurements, noises             */
+    jl_real *F;                 /* [n,n]                                    */
+    jl_real *W;                 /* [n,n] G Q G', process noise              */
+    jl_real *u;                 /* [n]   G w_bar, its mean                  */
+    jl_real *H;                 /* [m,n]                                    */
+    jl_real *R;                 /* [m,m]                                    */
+    jl_real *G;                 /* [n,p]                                    */
+    jl_real *Q;                 /* [p,p]                                    */
+} jl_mode;
+
+/* Reals of scratch for jl_mode_set. */
+#define JL_MODE_SCRATCH(n, m, p) \
+    ((n) * (n) + (n) * (p) + (m) * (m) + (p) * (p))
+
+/* Bind a mode to its memory: mem [cap], cap >= JL_MODE_MEM(n, m, p); all
+ * matrices are zero until jl_mode_set or jl_mode_motion fills them.
+ * Returns JL_OK, JL_EDIM (n, m, p outside 1..JL_MAX_STATES), JL_ENOMEM;
+ * *mode is untouched on error. */
+int jl_mode_init(jl_mode *mode, int n, int m, int p, jl_real *mem, int cap);
+
+/* Give a mode its matrices (copied): F [n,n] G [n,p] Q [p,p] w_bar [p] or NULL
+ * for 0, H [m,n] R [m,m]; scratch [JL_MODE_SCRATCH(n, m, p)].
+ * Q must be positive semidefinite, R positive definite.
+ * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF; *mode is untouched on
+ * error. */
+int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
+                const jl_real *Q, const jl_real *w_bar, const jl_real *H,
+                const jl_real *R, jl_real *scratch);
+
+/* --- catalogue --------------------------------------------------------- */
+
+enum {
+    JL_MOTION_CV = 1,           /* constant velocity                        */
+    JL_MOTION_CA = 2,           /* constant acceleration                    */
+    JL_MOTION_CT = 3            /* coordinated turn of known rate, 2 axes   */
+};
+
+/* A motion along `axes` coordinates.  The state holds per axis position and
+ * velocity (order 2) or position, velocity, acceleration (order 3), axis by
+ * axis; positions are measured with standard deviation sigma_z.  With T the
+ * time step, per axis:
+ *     CV  F = [1 T; 0 1], G = [T^2/2; T]; with order 3 the acceleration has a
+ *         zero row in both
+ *     CA  F = [1 T T^2/2; 0 1 T; 0 0 1], G = [T^2/2; T; 1]       (order 3)
+ *     CT  the velocity turns by turn_rate T and the position follows; G as CV
+ *         (axes 2; order 2, or 3 with zero acceleration)
+ * and Q = accel_std^2 I, R = sigma_z^2 I, one noise an axis. */
+typedef struct jl_motion {
+    int kind;                   /* JL_MOTION_...                            */
+    int axes;                   /* 1 or more; CT: 2                         */
+    int order;                  /* 2 or 3; CA: 3                            */
+    jl_real accel_std;          /* [m/s^2] >= 0                             */
+    jl_real turn_rate;          /* [rad/s] CT only; may be 0                */
+    jl_real sigma_z;            /* [m] > 0                                  */
+} jl_motion;
+
+/* Sizes of a motion's mode: n = axes order, m = p = axes. */
+
+/* Fill a mode (of the sizes above) for time step dt [s] > 0.  Cheap enough for
+ * every step of an irregular record.
+ * Returns JL_OK, JL_EDIM (sizes, axes, order, kind), JL_ENONFINITE, JL_ERANGE
+ * (accel_std < 0, sigma_z <= 0, |turn_rate| dt > 1024), JL_ETIME (dt <= 0);
+ * *mode is untouched on error. */
+int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt);
+
+/* The state after a first measurement z [axes]: x [n] at z with velocity 0 and
+ * acceleration 0; P [n,n] diagonal with variances sigma_z^2, v0_std^2, a0_std^2.
+ * Returns JL_OK, JL_EDIM, JL_ENONFINITE, JL_ERANGE (a deviation <= 0). */
+int jl_motion_start(jl_real *x, jl_real *P, const jl_motion *motion,
+                    const jl_real *z, jl_real v0_std, jl_real a0_std);
+
+/* --- the chain --------------------------------------------------------- */
+
+/* Transition probabilities over dt [s] >= 0 from mean dwell times:
+ *     Pi[i][i] = exp(-dt / sojourn_s[i]), the rest of row i shared evenly
+ * Pi [M,M], sojourn_s [M] > 0.  With one mode Pi = 1.
+ * Returns JL_OK, JL_EDIM, JL_ENONFINITE, JL_ERANGE (a sojourn <= 0), JL_ETIME
+ * (dt < 0); Pi is untouched on error. */
+int jl_chain_sojourn(jl_real *Pi, const jl_real *sojourn_s, int M,
+                     jl_real dt);
+
+/* Check a chain: Pi [M,M] and, unless NULL, mu [M].
+ * Returns JL_OK, JL_ENONFINITE, or JL_EPROB (an entry below 0, a row or mu
+ * whose sum is further from 1 than JL_PROB_TOLERANCE). */
+#if JL_REAL_FLOAT
+#define JL_PROB_TOLERANCE JL_C(1.0e-5)
+#else
+#define JL_PROB_TOLERANCE JL_C(1.0e-9)
+#endif
+int jl_chain_check(const jl_real *Pi, const jl_real *mu, int M);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

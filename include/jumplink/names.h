@@ -1,0 +1,72 @@
+/* The link names of the float library.
+ *
+ * A public name that has to do with jl_real is linked under another name when
+ * jl_real is float, so that a program built for one number type cannot be
+ * linked with the library of the other: the linker names what is missing.
+ */
+#ifndef JL_NAMES_H
+#define JL_NAMES_H
+
+#include "config.h"
+
+#if JL_REAL_FLOAT
+#define jl_exp jl_exp_f32
+#define jl_log jl_log_f32
+#define jl_sincos jl_sincos_f32
+
+#define jl_mat_mul jl_mat_mul_f32
+#define jl_mat_mul_t jl_mat_mul_t_f32
+#define jl_mat_sandwich jl_mat_sandwich_f32
+#define jl_mat_apply jl_mat_apply_f32
+#define jl_mat_cholesky jl_mat_cholesky_f32
+#define jl_mat_cholesky_solve jl_mat_cholesky_solve_f32
+#define jl_mat_lower_solve jl_mat_lower_solve_f32
+#define jl_mat_pack jl_mat_pack_f32
+#define jl_mat_unpack jl_mat_unpack_f32
+#define jl_vec_within jl_vec_within_f32
+#define jl_mat_check_cov jl_mat_check_cov_f32
+
+#define jl_mode_init jl_mode_init_f32
+#define jl_mode_set jl_mode_set_f32
+#define jl_mode_motion jl_mode_motion_f32
+#define jl_motion_start jl_motion_start_f32
+#define jl_chain_sojourn jl_chain_sojourn_f32
+#define jl_chain_check jl_chain_check_f32
+
+#define jl_kf_joseph jl_kf_joseph_f32
+#define jl_kf_standard jl_kf_standard_f32
+#define jl_kf_init jl_kf_init_f32
+#define jl_kf_set jl_kf_set_f32
+#define jl_kf_predict jl_kf_predict_f32
+#define jl_kf_update jl_kf_update_f32
+#define jl_kf_step jl_kf_step_f32
+
+#define jl_imm_init jl_imm_init_f32
+#define jl_imm_chain jl_imm_chain_f32
+#define jl_imm_set jl_imm_set_f32
+#define jl_imm_step jl_imm_step_f32
+#define jl_imm_mix jl_imm_mix_f32
+#define jl_imm_filter jl_imm_filter_f32
+#define jl_imm_weigh jl_imm_weigh_f32
+#define jl_imm_combine jl_imm_combine_f32
+#define jl_imm_foresee jl_imm_foresee_f32
+#define jl_imm_mix_mode jl_imm_mix_mode_f32
+#define jl_imm_predict_mode jl_imm_predict_mode_f32
+#define jl_imm_update_mode jl_imm_update_mode_f32
+
+#define jl_put_real jl_put_real_f32
+#define jl_get_real jl_get_real_f32
+#define jl_put_reals jl_put_reals_f32
+#define jl_get_reals jl_get_reals_f32
+
+#define jl_host_ready jl_host_ready_f32
+#define jl_host_send jl_host_send_f32
+#define jl_host_recv jl_host_recv_f32
+#define jl_host_stop jl_host_stop_f32
+#define jl_par_deal jl_par_deal_f32
+#define jl_par_init jl_par_init_f32
+#define jl_par_serve jl_par_serve_f32
+#define jl_par_step jl_par_step_f32
+#endif
+
+#endif

@@ -1,0 +1,145 @@
+/* The IMM spread over processing elements (PEs) joined by channels.
+ *
+ * Each mode has an owner.  For every measurement
+ *     PE0 receives it from the host and sends it to the others;
+ *     every PE predicts and updates its own modes;
+ *     one exchange: every PE sends every other (status, l_j, x_j, P_j) of its
+ *     own modes;
+ *     every PE weighs all modes itself, with the same code in the same order;
+ *     PE0 combines and answers the host.
+ * All sums run over modes in index order, so the result has the bits of
+ * jl_imm_step for any number of PEs, any owner table and any transport.  If a
+ * mode fails on any PE, all PEs see its status, and none changes its filter.
+ * (Pan, Dai, Zhang 1997, sections 3-6, with their three exchanges made one.)
+ *
+ * The exchange is one totally ordered list of hops, of which each PE executes
+ * its part, so it cannot deadlock even when every channel is a rendezvous.
+ */
+#ifndef JL_PAR_H
+#define JL_PAR_H
+
+#include "base.h"
+#include "chan.h"
+#include "imm.h"
+#include "wire.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* --- messages ---------------------------------------------------------- */
+
+/* A measurement.  dt is a difference and not a time, because an absolute time
+ * outgrows a float. */
+typedef struct jl_meas {
+    jl_u32 seq;                 /* its number: each greater than the last   */
+    jl_real dt;                 /* [s] >= 0 since the one before            */
+    const jl_real *z;           /* [m], or NULL: missing                    */
+} jl_meas;
+
+/* The answer to a measurement.  With a status other than JL_OK the filter did
+ * not change and there is nothing but seq and status. */
+typedef struct jl_estimate {
+    jl_u32 seq;
+    int status;                 /* JL_OK or why the step failed             */
+    jl_real loglik;
+    jl_real *x;                 /* [n]                                      */
+    jl_real *P;                 /* [n,n]                                    */
+    jl_real *mu;                /* [M]                                      */
+} jl_estimate;
+
+/* Octets of the longest message of a filter with M modes, n states and m
+ * measurements: a bound for one that carries all modes, the estimate, or z. */
+#define JL_PAR_MODE(n) (2 + (1 + (n) + JL_PACKED(n)) * JL_REAL_OCTETS)
+#define JL_PAR_MSG(M, n, m) \
+    (16 + (M) * JL_PAR_MODE(n) \
+     + ((M) + (m) + 2 + (n) + JL_PACKED(n)) * JL_REAL_OCTETS)
+
+/* --- the host's side --------------------------------------------------- */
+
+/* Wait for the PEs: PE0 says that all are there and agree on `fingerprint`.
+ * buf [cap] octets, 16 are enough.
+ * Returns JL_OK, JL_EMODEL, or the channel's error. */
+int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, unsigned char *buf,
+                  int cap, long timeout_us);
+
+/* Send a measurement with m components; buf [cap], cap >= JL_PAR_MSG(1, 1, m).
+ * Returns JL_OK, JL_ENOMEM, or the channel's error. */
+int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,
+                 unsigned char *buf, int cap, long timeout_us);
+
+/* Receive the answer; x [n], P [n,n], mu [M] of *estimate are the caller's.
+ * buf [cap], cap >= JL_PAR_MSG(M, n, 1).
+ * Returns JL_OK (look at estimate->status), JL_EMSG, JL_ELENGTH, or the
+ * channel's error. */
+int jl_host_recv(jl_chan *from_pe0, jl_estimate *estimate, int M, int n,
+                 unsigned char *buf, int cap, long timeout_us);
+
+/* Tell the PEs that the run is over.  buf [cap], 16 are enough. */
+int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,
+                 long timeout_us);
+
+/* --- the PE's side ----------------------------------------------------- */
+
+/* Called on every PE before a step, with the same arguments everywhere: for
+ * models rebuilt for meas->dt (jl_mode_motion, jl_imm_chain), or started from
+ * a first measurement.  Must do the same on every PE.
+ * Returns JL_OK (now the step), JL_STARTED (the measurement was used to set
+ * the state: no step), or a negative code: the step fails with it. */
+#define JL_STARTED 1
+typedef int (*jl_prepare)(void *context, jl_imm *imm, const jl_meas *meas);
+
+typedef struct jl_par_config {
+    int pe, npe;                /* which of how many: 0 <= pe < npe         */
+    const unsigned char *owner; /* [M] the PE of each mode; the PEs 0..A-1
+                                   own at least one each, the rest none     */
+    jl_chan *const *to;         /* [npe] channels to the other PEs          */
+    jl_chan *const *from;       /* [npe] ... and from them; [pe] not used   */
+    jl_chan *to_host;           /* PE0 only                                 */
+    jl_chan *from_host;
+    jl_prepare prepare;         /* or NULL: the model does not change       */
+    void *context;
+    jl_u32 fingerprint;         /* of the model: equal on all PEs and host  */
+    long timeout_us;            /* of each message of a step; JL_FOREVER    */
+} jl_par_config;
+
+typedef struct jl_par {
+    jl_par_config config;
+    jl_imm *imm;
+    int active;                 /* PEs that own modes                       */
+    int ahead;                  /* own modes are already mixed, predicted   */
+    jl_u32 seq;                 /* of the last measurement                  */
+    unsigned long steps;        /* measurements used                        */
+    unsigned long refused;      /* ... and refused, with their code         */
+    unsigned char *buf;         /* [cap]                                    */
+    int cap;
+    int *status;                /* [M] of the modes, in the present step    */
+} jl_par;
+
+/* The owner table that deals modes out in turn, j to PE j mod npe: the mapping
+ * that the paper's heuristic finds for modes of equal cost.  owner [M]. */
+void jl_par_deal(unsigned char *owner, int M, int npe);
+
+/* Bind a PE's part to its filter (all M modes on every PE) and memory: buf
+ * [cap] octets, cap >= JL_PAR_MSG(M, n, m); status [M].
+ * Returns JL_OK, JL_EDIM (pe, npe, owner), JL_ENOMEM, JL_ETOOLONG (a channel's
+ * max_len is below what its messages need); *par is untouched on error. */
+int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
+                unsigned char *buf, int cap, int *status);
+
+/* Serve until the host says stop: say ready, then step after step.  scratch
+ * [JL_IMM_SCRATCH(M, n, m)].
+ * Returns JL_OK after a stop, JL_EMODEL, or the error of the channel that
+ * failed. */
+int jl_par_serve(jl_par *par, jl_real *scratch);
+
+/* One step, when the measurement is already on every PE and every PE calls
+ * this: returns on all of them the same JL_OK or code of the first mode that
+ * failed, as jl_imm_step; or the error of the channel that failed.  The
+ * combined estimate is computed on PE0 (on the others call jl_imm_combine). */
+int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
