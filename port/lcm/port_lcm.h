@@ -1,0 +1,42 @@
+/* Port lcm: PEs are processes that talk by LCM messages (UDP multicast).
+ *
+ * Every node listens on one LCM channel, "JL.<run>.<node>"; what is sent to it
+ * are frames of jl_link, one link a peer, since LCM loses messages.  Messages
+ * on the network stay under 1400 octets; the receive buffer is 4 MB and the
+ * subscription's queue has no limit of its own.
+ */
+#ifndef PORT_LCM_H
+#define PORT_LCM_H
+
+#include "jumplink/chan.h"
+#include "jumplink/link.h"
+
+typedef struct jl_lcm jl_lcm;
+
+typedef struct jl_lcm_config {
+    const char *url;            /* "udpm://239.255.76.67:7667?ttl=0"        */
+    const char *run;            /* name of the run: [A-Za-z0-9_], 1 to 16   */
+    int node, nodes;            /* which of how many, the host included     */
+    int number;                 /* octets of a real: JL_REAL_OCTETS         */
+    int max_len;                /* octets of the longest message            */
+    int slots;                  /* longest messages held, >= 1; 2 is usual  */
+    double drop;                /* share of datagrams thrown away on        */
+    unsigned seed;              /* purpose before LCM sees them: tests      */
+} jl_lcm_config;
+
+/* Join the run.  Returns NULL and points *why to a static text when that fails
+ * ("no multicast route", "bad address", ...). */
+jl_lcm *jl_lcm_open(const jl_lcm_config *config, const char **why);
+
+/* Close: wait up to linger_us until all that was sent is acknowledged and the
+ * peers' last words are answered, then leave. */
+void jl_lcm_close(jl_lcm *lcm, long linger_us);
+
+/* Channels to and from another node; valid until jl_lcm_close. */
+jl_chan *jl_lcm_tx(jl_lcm *lcm, int node);
+jl_chan *jl_lcm_rx(jl_lcm *lcm, int node);
+
+/* Sum of the counters of all links. */
+jl_link_count jl_lcm_count(const jl_lcm *lcm);
+
+#endif
