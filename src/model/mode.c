@@ -1,0 +1,65 @@
+/* Modes given by matrices. */
+#include "jumplink/model.h"
+
+#include "mat/mat_k.h"
+
+int jl_mode_init(jl_mode *mode, int n, int m, int p, jl_real *mem, int cap)
+{
+    if (n < 1 || n > JL_MAX_STATES || m < 1 || m > JL_MAX_STATES
+        || p < 1 || p > JL_MAX_STATES)
+        return JL_EDIM;
+    if (cap < JL_MODE_MEM(n, m, p))
+        return JL_ENOMEM;
+    memset(mem, 0, (size_t)JL_MODE_MEM(n, m, p) * sizeof *mem);
+    mode->n = n;
+    mode->m = m;
+    mode->p = p;
+    mode->F = mem;
+    mode->W = mode->F + n * n;
+    mode->u = mode->W + n * n;
+    mode->H = mode->u + n;
+    mode->R = mode->H + m * n;
+    mode->G = mode->R + m * m;
+    mode->Q = mode->G + n * p;
+    return JL_OK;
+}
+
+int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
+                const jl_real *Q, const jl_real *w_bar, const jl_real *H,
+                const jl_real *R, jl_real *scratch)
+{
+    int n = mode->n, m = mode->m, p = mode->p, status;
+    jl_real *W = scratch, *GQ = W + n * n, *L = GQ + n * p, *work = L + m * m;
+
+    if (!jl_vec_within(F, n * n, JL_LARGE) || !jl_vec_within(G, n * p, JL_LARGE)
+        || !jl_vec_within(H, m * n, JL_LARGE)
+        || (w_bar != NULL && !jl_vec_within(w_bar, p, JL_LARGE)))
+        return JL_ENONFINITE;
+    status = jl_mat_check_cov(Q, work, p);
+    if (status != JL_OK)
+        return status;
+    status = jl_mat_check_cov(R, L, m);
+    if (status != JL_OK)
+        return status;
+    if (jli_cholesky(L, R, m) != JL_OK)
+        return JL_EDEF;
+    jl_mat_sandwich(W, G, Q, NULL, GQ, n, p);
+    if (!jl_vec_within(W, n * n, JL_LARGE * JL_LARGE))
+        return JL_ENONFINITE;
+    if (w_bar != NULL) {
+        jli_apply(GQ, G, w_bar, NULL, n, p);
+        if (!jl_vec_within(GQ, n, JL_LARGE))
+            return JL_ENONFINITE;
+        jli_copy(mode->u, GQ, n);
+    } else {
+        memset(mode->u, 0, (size_t)n * sizeof *mode->u);
+    }
+    jli_copy(mode->W, W, n * n);
+    jli_copy(mode->F, F, n * n);
+    jli_copy(mode->H, H, m * n);
+    jli_copy(mode->G, G, n * p);
+    jli_copy(mode->Q, Q, p * p);
+    jl_mat_pack(L, R, m);               /* exactly symmetric from here on */
+    jl_mat_unpack(mode->R, L, m);
+    return JL_OK;
+}
