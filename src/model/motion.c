@@ -22,9 +22,10 @@ static int motion_sizes(const jl_motion *motion)
     }
 }
 
+/* Everything finite, the largest element of W = g q g' included. */
 static int motion_numbers(const jl_motion *motion, jl_real dt)
 {
-    jl_real v[4];
+    jl_real v[4], g;
 
     v[0] = motion->accel_std;
     v[1] = motion->sigma_z;
@@ -34,6 +35,9 @@ static int motion_numbers(const jl_motion *motion, jl_real dt)
         return JL_ENONFINITE;
     if (v[0] < 0 || v[1] <= 0)
         return JL_ERANGE;
+    g = (dt > 2 ? dt * dt / 2 : 2) * v[0];
+    if (!jl_vec_within(&g, 1, JL_LARGE))
+        return JL_ENONFINITE;
     return dt > 0 ? JL_OK : JL_ETIME;
 }
 
