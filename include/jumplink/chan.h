@@ -20,7 +20,8 @@
  *    going (acknowledgements, repetitions).
  *  5 wait blocks until one of several channels of one PE, all of one port,
  *    has a message that recv would return at once, and gives the index of the
- *    first such in the list.
+ *    first such in the list.  (With slots = 0 a sender whose deadline passes
+ *    takes its message back, also after wait has seen it.)
  *  6 When the other end has closed, what it sent before can still be received;
  *    then recv returns JL_ECLOSED.  A send to it returns JL_ECLOSED.
  *  7 One thread at a time uses the channels of a PE.
@@ -61,20 +62,21 @@ struct jl_chan {
 void jl_chan_init(jl_chan *chan, const jl_chan_ops *ops, int max_len,
                   int slots);
 
-/* Send a message [len octets].
- * Returns JL_OK, JL_ETOOLONG (len > max_len), JL_ETIMEOUT, JL_ECLOSED, or
- * what else the port meets: JL_EDEADLOCK, JL_EPEER, JL_EIO. */
+/* Send a message [len octets]; msg may be NULL if len is 0.
+ * Returns JL_OK, JL_ETOOLONG (len > max_len), JL_ETIMEOUT, JL_ECLOSED,
+ * JL_ERANGE (a negative len or timeout), or what else the port meets:
+ * JL_EDEADLOCK, JL_EPEER, JL_EIO. */
 int jl_chan_send(jl_chan *chan, const unsigned char *msg, int len,
                  long timeout_us);
 
-/* Receive a message into msg [cap octets].
+/* Receive a message into msg [cap octets]; msg may be NULL if cap is 0.
  * Returns its length >= 0, or JL_ETOOLONG (the message stays), JL_ETIMEOUT,
- * JL_ECLOSED, JL_EDEADLOCK, JL_EPEER, JL_EIO. */
+ * JL_ECLOSED, JL_ERANGE, JL_EDEADLOCK, JL_EPEER, JL_EIO. */
 int jl_chan_recv(jl_chan *chan, unsigned char *msg, int cap, long timeout_us);
 
 /* Wait for a message on one of n >= 1 channels to receive from.
  * Returns the index of the first that has one (or whose recv would return an
- * error at once), or JL_ETIMEOUT, JL_EDEADLOCK, JL_EIO. */
+ * error at once), or JL_ETIMEOUT, JL_ERANGE, JL_EDEADLOCK, JL_EIO. */
 int jl_chan_wait(jl_chan *const *chans, int n, long timeout_us);
 
 #ifdef __cplusplus
