@@ -46,9 +46,9 @@ enum {                          /* how to mix */
 };
 
 /* Reals of state: two sets of estimates of M modes, the combined estimate,
- * Pi, and nine vectors over the modes. */
+ * Pi, and eight vectors over the modes. */
 #define JL_IMM_STATE(M, n) \
-    (2 * (M) * ((n) + (n) * (n)) + (n) + (n) * (n) + (M) * (M) + 9 * (M))
+    (2 * (M) * ((n) + (n) * (n)) + 2 * (n) + (n) * (n) + (M) * (M) + 8 * (M))
 #define JL_IMM_SCRATCH(M, n, m) (JL_KF_SCRATCH(n, m) + (M) + (n))
 
 typedef struct jl_imm {
@@ -59,6 +59,7 @@ typedef struct jl_imm {
     int sticky;                 /* Pi = diag(lambda) + 1 v' is used         */
     int stage;                  /* what may come next; see the calls        */
     int combined;               /* xhat, Phat belong to the present state   */
+    int missing;                /* the step under way has no measurement    */
 
     /* the state: valid between steps */
     jl_real *x;                 /* [M,n]                                    */
@@ -78,6 +79,7 @@ typedef struct jl_imm {
     jl_real *c;                 /* [M] exp(logc)                            */
     jl_real *l;                 /* [M] log-likelihoods                      */
     jl_real *e;                 /* [M] work                                 */
+    jl_real *d;                 /* [n] work                                 */
 
     /* the chain */
     jl_real *Pi;                /* [M,M]                                    */

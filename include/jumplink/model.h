@@ -104,7 +104,7 @@ int jl_motion_start(jl_real *x, jl_real *P, const jl_motion *motion,
 int jl_chain_sojourn(jl_real *Pi, const jl_real *sojourn_s, int M,
                      jl_real dt);
 
-/* Check a chain: Pi [M,M] and, unless NULL, mu [M].
+/* Check a chain: Pi [M,M] and mu [M]; either may be NULL.
  * Returns JL_OK, JL_ENONFINITE, or JL_EPROB (an entry below 0, a row or mu
  * whose sum is further from 1 than JL_PROB_TOLERANCE). */
 #if JL_REAL_FLOAT

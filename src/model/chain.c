@@ -47,7 +47,7 @@ int jl_chain_check(const jl_real *Pi, const jl_real *mu, int M)
 {
     int i, status = mu != NULL ? distribution(mu, M) : JL_OK;
 
-    for (i = 0; i < M && status == JL_OK; i++)
+    for (i = 0; Pi != NULL && i < M && status == JL_OK; i++)
         status = distribution(Pi + i * M, M);
     return status;
 }

@@ -1,0 +1,137 @@
+/* The IMM as an object: memory, chain, state. */
+#include "imm/imm_stage.h"
+
+#include "mat/mat_k.h"
+
+static void set_mu(jl_imm *imm, const jl_real *mu)
+{
+    int j;
+
+    for (j = 0; j < imm->M; j++) {
+        imm->mu[j] = mu != NULL ? mu[j] : 1 / (jl_real)imm->M;
+        imm->logmu[j] = jl_log(imm->mu[j]);
+    }
+}
+
+static void layout(jl_imm *imm, jl_real *mem)
+{
+    int M = imm->M, n = imm->n;
+
+    imm->x = mem;
+    imm->P = imm->x + M * n;
+    imm->xw = imm->P + M * n * n;
+    imm->Pw = imm->xw + M * n;
+    imm->xhat = imm->Pw + M * n * n;
+    imm->Phat = imm->xhat + n;
+    imm->d = imm->Phat + n * n;
+    imm->Pi = imm->d + n;
+    imm->logmu = imm->Pi + M * M;
+    imm->mu = imm->logmu + M;
+    imm->logc = imm->mu + M;
+    imm->c = imm->logc + M;
+    imm->l = imm->c + M;
+    imm->e = imm->l + M;
+    imm->lambda = imm->e + M;
+    imm->v = imm->lambda + M;
+}
+
+int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
+                const jl_kf_form *form, int mixing, jl_real *mem, int cap)
+{
+    int i, j, n;
+
+    if (M < 1 || M > JL_MAX_MODES
+        || (mixing != JL_MIX_AUTO && mixing != JL_MIX_GENERAL))
+        return JL_EDIM;
+    n = modes[0].n;
+    for (j = 1; j < M; j++)
+        if (modes[j].n != n || modes[j].m != modes[0].m)
+            return JL_EDIM;
+    if (cap < JL_IMM_STATE(M, n))
+        return JL_ENOMEM;
+
+    memset(mem, 0, (size_t)JL_IMM_STATE(M, n) * sizeof *mem);
+    imm->M = M;
+    imm->n = n;
+    imm->m = modes[0].m;
+    imm->modes = modes;
+    imm->form = form;
+    imm->mixing = mixing;
+    layout(imm, mem);
+    for (j = 0; j < M; j++) {
+        imm->Pi[j * M + j] = 1;
+        imm->lambda[j] = 1;                     /* v = 0 */
+        for (i = 0; i < n; i++)
+            imm->P[j * n * n + i * (n + 1)] = 1;
+    }
+    imm->sticky = mixing == JL_MIX_AUTO;
+    imm->stage = JLI_IDLE;
+    imm->missing = 0;
+    imm->loglik = 0;
+    set_mu(imm, NULL);
+    jl_imm_combine(imm);
+    return JL_OK;
+}
+
+/* v_j, the common entry of column j off the diagonal, or -1 if there is none:
+ * common up to a few roundings relative to itself, as is left by an author who
+ * computed (1 - p) / (M - 1). */
+static jl_real common_entry(const jl_real *Pi, int M, int j)
+{
+    jl_real least = JL_REAL_MAX, most = 0;
+    int i;
+
+    if (M == 1)
+        return 0;
+    for (i = 0; i < M; i++) {
+        jl_real p = Pi[i * M + j];
+
+        if (i != j && p < least)
+            least = p;
+        if (i != j && p > most)
+            most = p;
+    }
+    if (most - least > 8 * JL_EPSILON * least)
+        return -1;
+    return least <= Pi[j * M + j] ? least : -1;
+}
+
+int jl_imm_chain(jl_imm *imm, const jl_real *Pi)
+{
+    int j, M = imm->M, status = jl_chain_check(Pi, NULL, M);
+
+    if (status != JL_OK)
+        return status;
+    jli_copy(imm->Pi, Pi, M * M);
+    imm->sticky = imm->mixing == JL_MIX_AUTO;
+    for (j = 0; j < M && imm->sticky; j++) {
+        imm->v[j] = common_entry(Pi, M, j);
+        imm->lambda[j] = Pi[j * M + j] - imm->v[j];
+        imm->sticky = imm->v[j] >= 0;
+    }
+    imm->stage = JLI_IDLE;
+    return JL_OK;
+}
+
+int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,
+               const jl_real *mu, jl_real *scratch)
+{
+    int j, M = imm->M, n = imm->n, status = jl_chain_check(NULL, mu, M);
+
+    if (status == JL_OK && !jl_vec_within(x, M * n, JL_LARGE))
+        status = JL_ENONFINITE;
+    for (j = 0; j < M && status == JL_OK; j++)
+        status = jl_mat_check_cov(P + j * n * n, scratch, n);
+    if (status != JL_OK)
+        return status;
+    jli_copy(imm->x, x, M * n);
+    for (j = 0; j < M; j++) {           /* exactly symmetric from here on */
+        jl_mat_pack(scratch, P + j * n * n, n);
+        jl_mat_unpack(imm->P + j * n * n, scratch, n);
+    }
+    set_mu(imm, mu);
+    imm->loglik = 0;
+    imm->stage = JLI_IDLE;
+    jl_imm_combine(imm);
+    return JL_OK;
+}

@@ -1,0 +1,171 @@
+/* The IMM against 60-digit references: every case, form and mixing that a
+ * plain covariance can do, in the metric and the tolerances of the cases'
+ * makers: x in units of sigma = sqrt(P_aa), floored at 1e-6 of its median over
+ * time, P_ab by sigma_a sigma_b, mu absolute, loglik by 1 + |loglik|. */
+#include "close.h"
+
+#include <stdlib.h>
+
+#include "jumplink.h"
+
+struct imm_case {
+    const char *name;
+    int M, n, m, p, rows;
+    const double *F, *G, *Q, *H, *R, *w_bar, *x0, *P0, *Pi, *mu0, *z;
+    const double *expected;             /* rows of x, P packed, mu, loglik */
+};
+
+#include "imm_cases.h"
+
+#define N 8
+#define MODES 12
+#define ROWS 2048
+
+struct tolerance {
+    double x, P, mu, loglik;
+};
+
+#if JL_REAL_FLOAT
+static const struct tolerance ordinary = { 2e-2, 2e-3, 2e-3, 1e-3 };
+#else
+static const struct tolerance ordinary = { 1e-10, 1e-11, 1e-11, 1e-11 };
+static const struct tolerance hard_joseph = { 5e-3, 2e-4, 5e-6, 5e-7 };
+#endif
+
+/* What each case needs; NULL: not for a plain covariance. */
+static const struct tolerance *tolerance_of(const char *name,
+                                            const jl_kf_form *form)
+{
+    if (strcmp(name, "hardest") == 0)
+        return NULL;
+#if JL_REAL_FLOAT
+    (void)form;
+    return strcmp(name, "hard") == 0 ? NULL : &ordinary;
+#else
+    if (strcmp(name, "hard") == 0)
+        return form == &jl_kf_joseph ? &hard_joseph : NULL;
+    return &ordinary;
+#endif
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+
+    return (x > y) - (x < y);
+}
+
+/* sigma [rows,n] of a case, floored. */
+static void sigmas(double *sigma, const struct imm_case *c)
+{
+    static double sorted[ROWS];
+    int width = c->n + JL_PACKED(c->n) + c->M + 1, a, k, at = c->n;
+
+    for (a = 0; a < c->n; at += c->n - a, a++) {
+        for (k = 0; k < c->rows; k++)
+            sorted[k] = sigma[k * c->n + a] = sqrt(c->expected[k * width + at]);
+        qsort(sorted, (size_t)c->rows, sizeof *sorted, ascending);
+        for (k = 0; k < c->rows; k++)
+            if (sigma[k * c->n + a] < 1e-6 * sorted[c->rows / 2])
+                sigma[k * c->n + a] = 1e-6 * sorted[c->rows / 2];
+    }
+}
+
+static void check_row(const struct imm_case *c, const struct tolerance *t,
+                      const double *want, const double *sigma,
+                      const jl_imm *imm)
+{
+    int a, b, n = c->n;
+
+    for (a = 0; a < n; a++)
+        assert_close((double)imm->xhat[a] / sigma[a], want[a] / sigma[a], t->x);
+    want += n;
+    for (a = 0; a < n; a++)
+        for (b = a; b < n; b++, want++)
+            assert_close((double)imm->Phat[a * n + b] / sigma[a] / sigma[b],
+                         *want / sigma[a] / sigma[b], t->P);
+    for (a = 0; a < c->M; a++)
+        assert_close(imm->mu[a], want[a], t->mu);
+    assert_close(((double)imm->loglik - want[c->M]) / (1 + fabs(want[c->M])),
+                 0, t->loglik);
+}
+
+static const jl_real *real(jl_real *to, const double *from, int n)
+{
+    int i;
+
+    for (i = 0; i < n; i++)
+        to[i] = (jl_real)from[i];
+    return to;
+}
+
+static void run(const struct imm_case *c, const jl_kf_form *form, int mixing,
+                const struct tolerance *t)
+{
+    static jl_real mode_mem[MODES][JL_MODE_MEM(N, N, N)];
+    static jl_real mem[JL_IMM_STATE(MODES, N)];
+    static jl_real scratch[JL_IMM_SCRATCH(MODES, N, N)];
+    static jl_real big[3][MODES * N * N], row[7][N * N];
+    static double sigma[ROWS * N];
+    jl_mode modes[MODES];
+    jl_imm imm;
+    int j, k, n = c->n, m = c->m, p = c->p, M = c->M;
+    int width = n + JL_PACKED(n) + M + 1;
+
+    assert_true(M <= MODES && n <= N && c->rows <= ROWS);
+    for (j = 0; j < M; j++) {
+        assert_int_equal(jl_mode_init(&modes[j], n, m, p, mode_mem[j],
+                                      JL_MODE_MEM(N, N, N)), JL_OK);
+        assert_int_equal(
+            jl_mode_set(&modes[j], real(row[0], c->F + j * n * n, n * n),
+                        real(row[1], c->G + j * n * p, n * p),
+                        real(row[2], c->Q + j * p * p, p * p),
+                        real(row[3], c->w_bar + j * p, p),
+                        real(row[4], c->H + j * m * n, m * n),
+                        real(row[5], c->R + j * m * m, m * m), scratch),
+            JL_OK);
+    }
+    assert_int_equal(jl_imm_init(&imm, M, modes, form, mixing, mem,
+                                 JL_IMM_STATE(MODES, N)), JL_OK);
+    assert_int_equal(jl_imm_chain(&imm, real(big[0], c->Pi, M * M)), JL_OK);
+    assert_int_equal(jl_imm_set(&imm, real(big[0], c->x0, M * n),
+                                real(big[1], c->P0, M * n * n),
+                                real(big[2], c->mu0, M), scratch), JL_OK);
+    sigmas(sigma, c);
+    for (k = 0; k < c->rows; k++) {
+        assert_int_equal(jl_imm_step(&imm, real(row[6], c->z + k * m, m),
+                                     scratch), JL_OK);
+        check_row(c, t, c->expected + k * width, sigma + k * n, &imm);
+    }
+}
+
+static void test_imm_meets_reference(void **state)
+{
+    static const int mixings[] = { JL_MIX_AUTO, JL_MIX_GENERAL };
+    const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard };
+    size_t c, f, x;
+    int ran = 0;
+
+    (void)state;
+    for (c = 0; c < sizeof imm_cases / sizeof *imm_cases; c++)
+        for (f = 0; f < 2; f++)
+            for (x = 0; x < 2; x++) {
+                const struct tolerance *t
+                    = tolerance_of(imm_cases[c].name, forms[f]);
+
+                if (t != NULL) {
+                    run(&imm_cases[c], forms[f], mixings[x], t);
+                    ran++;
+                }
+            }
+    assert_int_equal(ran, JL_REAL_FLOAT ? 20 : 22);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_imm_meets_reference),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
