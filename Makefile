@@ -1,14 +1,17 @@
-# Jumplink.  `make` needs only a C compiler; `make sim` and `make test` install
-# what else they need (make deps).
+# Jumplink.  `make` needs only a C compiler; the other targets install the
+# Debian packages they need (tests/check/deps.sh lists them).
 #
-#   make            the static libraries (double and float), and the program and
-#                   ports as far as their packages are there
+#   make            the static libraries (double and float), and the ports and
+#                   the program as far as their packages are there
 #   make sim        the main job: four PEs over LCM on a recorded flight
-#   make test       every test
+#   make test       every test, with double and with float
 #   make check      standards, layers, symbols, cross-builds
 #   make sanitize   every test under AddressSanitizer and UBSan
-#   make deps       install the Debian packages that sim and test need
-#   make install    library, headers and program to $(DESTDIR)$(PREFIX)
+#   make deps       install the packages that sim and test need
+#   make install    libraries, headers, program to $(DESTDIR)$(PREFIX)
+#   make clean
+#
+# Everything made is under $(BUILD); what ends in _f32 has float numbers.
 
 BUILD ?= build
 PREFIX ?= /usr/local
@@ -19,59 +22,137 @@ WARN := -Wall -Wextra -Wshadow -Wconversion -Wundef -Wstrict-prototypes \
     -Wmissing-prototypes -Wdouble-promotion
 # No contraction and no reordering: results must have the same bits everywhere.
 EXACT := -ffp-contract=off -fno-math-errno
-CORE := -std=c89 -pedantic $(WARN) -Wdeclaration-after-statement $(EXACT) -Iinclude -Isrc
-HOST := -std=c11 -D_GNU_SOURCE $(WARN) $(EXACT) -Iinclude -Iport -Isim -Itests -Isrc -pthread
+CORE := -std=c89 -pedantic $(WARN) -Wdeclaration-after-statement $(EXACT) \
+    -Iinclude -Isrc
+HOST := -std=c11 -D_GNU_SOURCE -pthread $(WARN) $(EXACT) -Iinclude -Iport -Isim
+FLOAT := -DJL_REAL_FLOAT=1
 
 have = $(shell printf '\#include <$(1)>\n' | $(CC) -E -xc - >/dev/null 2>&1 && echo yes)
 HAVE_LCM := $(call have,lcm/lcm.h)
 HAVE_JANSSON := $(call have,jansson.h)
+PROGRAMS := $(if $(and $(HAVE_LCM),$(HAVE_JANSSON),$(wildcard sim/main.c)),$(BUILD)/jumplink $(BUILD)/jumplink_f32)
 
 CORE_SRC := $(wildcard src/*/*.c)
 PORT_SRC := $(wildcard port/loop/*.c) $(if $(HAVE_LCM),$(wildcard port/lcm/*.c))
 SIM_SRC := $(wildcard sim/*.c)
-PROGRAMS := $(if $(HAVE_LCM),$(if $(HAVE_JANSSON),$(BUILD)/jumplink $(BUILD)/jumplink_f32))
-SIM_LIBS := -llcm -ljansson -lm
+LIBS := -Wl,--as-needed -llcm -ljansson -lm
 
-.PHONY: all deps sim test check sanitize install clean
+.PHONY: all lib deps sim test golden run-tests check sanitize install clean force
 .DELETE_ON_ERROR:
+.SECONDARY:
 
-all: $(BUILD)/libjumplink.a $(BUILD)/libjumplink_f32.a $(BUILD)/libports.a $(PROGRAMS)
-	@$(if $(HAVE_LCM),:,echo "skipped: port lcm and the program (no lcm/lcm.h: make deps)")
-	@$(if $(HAVE_JANSSON),:,echo "skipped: the program (no jansson.h: make deps)")
+all: lib $(BUILD)/libports.a $(PROGRAMS)
+	@$(if $(HAVE_LCM),:,echo "skipped: port lcm and the program (no lcm/lcm.h; make deps installs it)")
+	@$(if $(HAVE_JANSSON),:,echo "skipped: the program (no jansson.h; make deps installs it)")
+lib: $(BUILD)/libjumplink.a $(BUILD)/libjumplink_f32.a
 
-# --- the library, once for each number type -------------------------------
+# --- libraries -----------------------------------------------------------
 
-CORE_OBJ := $(CORE_SRC:%.c=$(BUILD)/obj/%.o)
-CORE_OBJ_F32 := $(CORE_SRC:%.c=$(BUILD)/obj_f32/%.o)
-
-$(BUILD)/libjumplink.a: $(CORE_OBJ)
-$(BUILD)/libjumplink_f32.a: $(CORE_OBJ_F32)
+$(BUILD)/libjumplink.a: $(CORE_SRC:%.c=$(BUILD)/obj/%.o)
+$(BUILD)/libjumplink_f32.a: $(CORE_SRC:%.c=$(BUILD)/obj_f32/%.o)
 $(BUILD)/libports.a: $(PORT_SRC:%.c=$(BUILD)/obj/%.o)
 $(BUILD)/libsim.a: $(filter-out %/main.o,$(SIM_SRC:%.c=$(BUILD)/obj/%.o))
 $(BUILD)/libsim_f32.a: $(filter-out %/main.o,$(SIM_SRC:%.c=$(BUILD)/obj_f32/%.o))
-%.a:
-	@rm -f $@
-	$(AR) rcs $@ $^
+$(BUILD)/%.a: $(BUILD)/sources
+	@rm -f $@; echo '  $@'; $(AR) rcs $@ $(filter %.o,$^)
 
-$(BUILD)/obj/src/%.o: src/%.c
-	@mkdir -p $(@D)
-	$(CC) $(CORE) $(CFLAGS) -MMD -c $< -o $@
-$(BUILD)/obj_f32/src/%.o: src/%.c
-	@mkdir -p $(@D)
-	$(CC) $(CORE) -DJL_REAL_FLOAT=1 $(CFLAGS) -MMD -c $< -o $@
-$(BUILD)/obj/%.o: %.c
-	@mkdir -p $(@D)
-	$(CC) $(HOST) $(CFLAGS) -MMD -c $< -o $@
-$(BUILD)/obj_f32/%.o: %.c
-	@mkdir -p $(@D)
-	$(CC) $(HOST) -DJL_REAL_FLOAT=1 $(CFLAGS) -MMD -c $< -o $@
+compile = @mkdir -p $(@D); echo '  $@'; $(CC) $(1) $(CFLAGS) -MMD -MP -c $< -o $@
+$(BUILD)/obj/src/%.o: src/%.c $(BUILD)/flags
+	$(call compile,$(CORE))
+$(BUILD)/obj_f32/src/%.o: src/%.c $(BUILD)/flags
+	$(call compile,$(CORE) $(FLOAT))
+$(BUILD)/obj/%.o: %.c $(BUILD)/flags
+	$(call compile,$(HOST))
+$(BUILD)/obj_f32/%.o: %.c $(BUILD)/flags
+	$(call compile,$(HOST) $(FLOAT))
 
-# --- the program -----------------------------------------------------------
+# Two notes that change only when what they say changes, so that other flags
+# or a source that is gone also rebuild what they concern.
+$(BUILD)/flags: NOTE = $(CC) $(CORE) $(HOST) $(CFLAGS)
+$(BUILD)/sources: NOTE = $(CORE_SRC) $(PORT_SRC) $(SIM_SRC)
+$(BUILD)/flags $(BUILD)/sources: force
+	@mkdir -p $(@D)
+	@echo '$(NOTE)' | cmp -s - $@ || echo '$(NOTE)' >$@
+
+# --- the program ---------------------------------------------------------
 
 $(BUILD)/jumplink: $(BUILD)/obj/sim/main.o $(BUILD)/libsim.a $(BUILD)/libports.a $(BUILD)/libjumplink.a
 $(BUILD)/jumplink_f32: $(BUILD)/obj_f32/sim/main.o $(BUILD)/libsim_f32.a $(BUILD)/libports.a $(BUILD)/libjumplink_f32.a
 $(BUILD)/jumplink $(BUILD)/jumplink_f32:
-	$(CC) $(CFLAGS) -pthread $^ $(SIM_LIBS) -o $@
+	@echo '  $@'; $(CC) $(CFLAGS) -pthread $^ $(LIBS) -o $@
+
+# --- what needs packages -------------------------------------------------
+
+# deps may install a header that was not there when this make looked for it,
+# so the work is done by a second make, which looks again.
+AGAIN = +@$(MAKE) --no-print-directory $(if $(findstring -j,$(MAKEFLAGS)),,-j2)
+
+deps:
+	@CC='$(CC)' sh tests/check/deps.sh sim test
+
+sim: deps
+	$(AGAIN) $(BUILD)/jumplink
+	$(BUILD)/jumplink sim $(SIM_ARGS)
+
+test: deps
+	$(AGAIN) run-tests
+
+sanitize: deps
+	$(AGAIN) run-tests BUILD=$(BUILD)/sanitize \
+	    CFLAGS='-O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all'
+
+check: deps
+	@CC='$(CC)' sh tests/check/deps.sh check
+	$(AGAIN) golden
+	@MAKE='$(MAKE)' BUILD='$(BUILD)/check' GOLDEN='$(BUILD)/golden' sh tests/check/check_all.sh
+
+# --- tests ---------------------------------------------------------------
+
+# tests/<folder>/test_x.c becomes $(BUILD)/tests/test_x and
+# $(BUILD)/tests_f32/test_x; other .c files help the tests of their folder.
+# A test knows the checkout (TOP_DIR) and its program (JUMPLINK) by macros.
+TEST_FOLDERS := unit golden conform program
+TESTING = $(HOST) -Isrc -Itests -I$(BUILD)/golden -DTOP_DIR='"$(CURDIR)"' \
+    -DJUMPLINK='"$(abspath $(BUILD)/jumplink$(1))"'
+
+define tests_of # folder, suffix
+HELP_$(1)$(2) := $$(patsubst %.c,$(BUILD)/obj$(2)/%.o,$$(filter-out \
+    tests/$(1)/test_% tests/$(1)/gen_%,$$(wildcard tests/$(1)/*.c)))
+TESTS_$(1)$(2) := $$(patsubst tests/$(1)/%.c,$(BUILD)/tests$(2)/%,$$(wildcard \
+    tests/$(1)/test_*.c))
+TESTS += $$(TESTS_$(1)$(2))
+$$(TESTS_$(1)$(2)): $(BUILD)/tests$(2)/%: $(BUILD)/obj$(2)/tests/$(1)/%.o \
+    $$(HELP_$(1)$(2)) $(BUILD)/libsim$(2).a $(BUILD)/libports.a $(BUILD)/libjumplink$(2).a
+	@mkdir -p $$(@D); echo '  $$@'; $$(CC) $$(CFLAGS) -pthread $$^ -Wl,--as-needed -lcmocka $$(LIBS) -o $$@
+endef
+$(foreach f,$(TEST_FOLDERS),$(eval $(call tests_of,$f,))$(eval $(call tests_of,$f,_f32)))
+
+$(BUILD)/obj/tests/%.o: tests/%.c $(BUILD)/flags | golden
+	$(call compile,$(call TESTING,))
+$(BUILD)/obj_f32/tests/%.o: tests/%.c $(BUILD)/flags | golden
+	$(call compile,$(call TESTING,_f32) $(FLOAT))
+
+# The reference cases as C tables, so that the same test bodies run on a board.
+GOLDEN := $(if $(wildcard tests/golden/gen_golden.c),$(BUILD)/golden/imm_cases.h)
+golden: $(GOLDEN)
+$(BUILD)/golden/imm_cases.h: $(BUILD)/gen_golden $(wildcard tests/golden/imm/*/*)
+	@mkdir -p $(@D)
+	$(BUILD)/gen_golden tests/golden/imm >$@
+$(BUILD)/gen_golden: tests/golden/gen_golden.c $(BUILD)/flags
+	$(CC) $(HOST) $(CFLAGS) $< $(LIBS) -o $@
+
+run-tests: $(TESTS) $(PROGRAMS) lib
+	@CC='$(CC)' CFLAGS='$(CFLAGS)' BUILD='$(BUILD)' sh tests/check/run_tests.sh \
+	    $(sort $(TESTS)) tests/check/test_mixing.sh
+
+# --- the rest ------------------------------------------------------------
+
+install: all
+	mkdir -p $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include/jumplink $(DESTDIR)$(PREFIX)/bin
+	cp $(BUILD)/libjumplink.a $(BUILD)/libjumplink_f32.a $(DESTDIR)$(PREFIX)/lib/
+	cp include/jumplink.h $(DESTDIR)$(PREFIX)/include/
+	cp include/jumplink/*.h $(DESTDIR)$(PREFIX)/include/jumplink/
+	$(if $(PROGRAMS),cp $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin/)
 
 clean:
 	rm -rf $(BUILD)
