@@ -11,14 +11,18 @@
  * the receiver takes them in order only and acknowledges by the number of the
  * next piece it waits for, on data that goes back anyway or, after ack_us or
  * half a window, in a frame of its own.  What is not acknowledged in time
- * (rto_us, doubled up to 16 times) is sent again.
+ * (rto_us, doubled up to 16 times) is sent again: first one piece alone, and
+ * when that is acknowledged, the rest.  A receiver without room drops what
+ * comes, unacknowledged, and tells when there is room again; if that word is
+ * lost, the sender's repetitions find out.
  *
  * Sessions.  Each end has a session number, new for every start of the
  * program.  HELLO frames tell it to the other end, and the link is up only
  * when a frame has shown that the other end knows ours: a recorded frame, or
- * one of an earlier life of the other end, never can.  When the other end is
- * shown to have restarted, the link fails with JL_EPEER: what was under way
- * cannot be known to have arrived.
+ * one of an earlier life of the other end, never can.  When an end that is up
+ * hears of another session of the other end, it asks that session (DOUBT).
+ * Only a living other end answers (ALIVE); then it has restarted, and the link
+ * fails with JL_EPEER: what was under way cannot be known to have arrived.
  *
  * Times are unsigned microseconds modulo 2^32 of any clock that does not go
  * back; only differences count, so the wrap after 71 minutes is harmless.
@@ -40,7 +44,8 @@ typedef struct jl_link_config {
     int max_len;                /* octets of the longest message, >= 0      */
     int slots;                  /* longest messages held each way, >= 1     */
     jl_u32 rto_us;              /* first retransmission time, say 20000     */
-    jl_u32 ack_us;              /* longest wait with an acknowledgement     */
+    jl_u32 ack_us;              /* longest wait with an acknowledgement; well
+                                   below rto_us, or much is sent twice      */
 } jl_link_config;
 
 /* What happened on a link, counted since init. */
@@ -50,54 +55,66 @@ typedef struct jl_link_count {
     unsigned long acks;         /* frames that only acknowledge             */
     unsigned long received;     /* data frames taken                        */
     unsigned long doubled;      /* data frames that we had already          */
-    unsigned long early;        /* data frames ahead of a lost one: dropped */
-    unsigned long refused;      /* not frames, damaged, of another type     */
-    unsigned long stale;        /* frames of another session                */
+    unsigned long early;        /* data frames ahead of a lost one, or when
+                                   there was no room: dropped               */
+    unsigned long refused;      /* not frames, damaged, of another type, not
+                                   between these two ends, too long for us  */
+    unsigned long stale;        /* frames of or for another session         */
 } jl_link_count;
 
-/* One piece of a message in memory: its octets behind room for the header. */
-typedef struct jl_link jl_link;
+/* Longest rto_us and ack_us: 67 s. */
+#define JL_LINK_MAX_US 67108864L
 
-/* Pieces a message of len octets is cut into, and the window for it. */
-#define JL_LINK_PIECES(max_len) \
-    ((max_len) <= 0 ? 1 : ((max_len) - 1) / JL_FRAME_PAYLOAD + 1)
+/* Pieces a message of len octets is cut into. */
+#define JL_LINK_PIECES(len) \
+    ((len) <= 0 ? 1 : ((len) - 1) / JL_FRAME_PAYLOAD + 1)
+
+/* Octets that a piece takes in memory: its length, its kind, itself. */
+#define JL_LINK_PIECE (4 + JL_FRAME_PAYLOAD)
 
 /* Octets of memory for a link: `slots` longest messages each way. */
 #define JL_LINK_MEM(max_len, slots) \
-    (2 * (slots) * JL_LINK_PIECES(max_len) * (JL_FRAME_MAX + 4))
+    (2 * (slots) * JL_LINK_PIECES(max_len) * JL_LINK_PIECE)
 
-struct jl_link {
+typedef struct jl_link {
     jl_link_config config;
     int window;                 /* pieces held each way                     */
-    unsigned char *out;         /* ring of pieces not acknowledged          */
-    unsigned char *in;          /* ring of pieces not fetched by recv       */
     jl_u32 peer;                /* the other end's session; 0: unknown      */
     int up;                     /* both ends know each other                */
-    int failed;                 /* JL_OK, JL_EPEER or JL_ECLOSED            */
-    int closing;                /* we closed: BYE goes out behind the data  */
+    int failed;                 /* JL_OK, JL_EPEER; JL_ECLOSED: BYE came    */
+    int closing;                /* we closed: the last piece is BYE         */
+    unsigned char *out;         /* ring of pieces not acknowledged          */
+    int out_slot;               /* where in the ring the oldest lies        */
     jl_u32 out_first;           /* oldest piece not acknowledged            */
     jl_u32 out_next;            /* next piece to transmit                   */
-    jl_u32 out_end;             /* behind the last piece handed to us       */
     jl_u32 out_high;            /* behind the last piece ever transmitted   */
-    jl_u32 in_first;            /* oldest piece not fetched                 */
+    jl_u32 out_end;             /* behind the last piece handed to us       */
+    jl_u32 sent_at;             /* when a piece or HELLO last went out      */
+    jl_u32 wait_us;             /* how long from then until sent again      */
+    unsigned char *in;          /* ring of pieces not fetched by recv       */
+    int in_slot;                /* where in the ring the oldest lies        */
+    int in_held;                /* pieces in the ring                       */
+    int in_len;                 /* octets of the message still arriving     */
     jl_u32 in_next;             /* next piece to arrive                     */
-    jl_u32 timer;               /* when to send again, or HELLO again       */
-    jl_u32 rto_us;              /* the present retransmission time          */
-    jl_u32 ack_timer;           /* when the acknowledgement must go         */
-    int ack_due;                /* pieces not acknowledged yet              */
-    int ack_now;
-    int hello_due;
-    jl_u32 challenger;          /* session of a possible restart; 0: none   */
+    int ack_due;                /* pieces taken and not acknowledged        */
+    jl_u32 due_at;              /* since when                               */
+    int ack_now;                /* acknowledge without waiting              */
+    int room_lacked;            /* a piece was dropped for want of room     */
+    int room_now;               /* tell that there is room again            */
+    int hello_now;              /* send HELLO without waiting               */
+    jl_u32 doubt;               /* session to send DOUBT to; 0: none        */
+    jl_u32 alive;               /* session to send ALIVE to; 0: none        */
     jl_link_count count;
-};
+} jl_link;
 
 /* Make a link over mem [cap octets], cap >= JL_LINK_MEM(max_len, slots).
- * Returns JL_OK, JL_EDIM (a field of config out of range), JL_ENOMEM;
+ * Returns JL_OK, JL_EDIM (a field of config out of range, from = to, memory
+ * beyond an int), JL_ENOMEM;
  * *link is untouched on error. */
 int jl_link_init(jl_link *link, const jl_link_config *config,
                  unsigned char *mem, int cap, jl_u32 now);
 
-/* Take a message to be sent [len].
+/* Take a message to be sent [len], also before the link is up.
  * Returns JL_OK, JL_EAGAIN (no room before more is acknowledged),
  * JL_ETOOLONG, JL_ECLOSED (either end has closed), JL_EPEER. */
 int jl_link_send(jl_link *link, const unsigned char *msg, int len);
@@ -112,8 +129,10 @@ int jl_link_peek(const jl_link *link);
 
 /* A datagram [len] came from the carrier, at the time now.  Anything may be
  * in it.  Returns JL_OK if it was of use, or the reason why it was counted
- * and dropped: a code of jl_frame_decode, JL_EMSG (not for this link),
- * JL_EPEER (another session). */
+ * and dropped: a code of jl_frame_decode, JL_ELENGTH (more than max_len),
+ * JL_EMSG (not between these ends, or after BYE), JL_EPEER (another session,
+ * or the link has failed), JL_EORDER (had already, or ahead of a lost one),
+ * JL_EAGAIN (no room: it will be sent again). */
 int jl_link_input(jl_link *link, const unsigned char *datagram, int len,
                   jl_u32 now);
 
@@ -126,11 +145,14 @@ int jl_link_output(jl_link *link, unsigned char *datagram, jl_u32 now);
  * now; -1 for not before something comes in or is sent. */
 long jl_link_timer(const jl_link *link, jl_u32 now);
 
-/* Close this end: no more send; what was sent is still delivered. */
+/* Close this end: no more send; what was sent is still delivered, and what the
+ * other end sends still comes in. */
 void jl_link_close(jl_link *link);
 
 /* 1 if nothing is under way: all sent pieces are acknowledged, and so are all
- * received ones, and a close was told to the other end. */
+ * received ones, and a close was told to the other end; or the link failed.
+ * The last acknowledgement may be lost: who leaves should go on for a few
+ * rto_us to answer repetitions. */
 int jl_link_idle(const jl_link *link);
 
 #ifdef __cplusplus

@@ -67,6 +67,7 @@
 #define jl_par_init jl_par_init_f32
 #define jl_par_serve jl_par_serve_f32
 #define jl_par_step jl_par_step_f32
+#define jl_par_ahead jl_par_ahead_f32
 #endif
 
 #endif

@@ -55,6 +55,11 @@ typedef struct jl_estimate {
     (16 + (M) * JL_PAR_MODE(n) \
      + ((M) + (m) + 2 + (n) + JL_PACKED(n)) * JL_REAL_OCTETS)
 
+/* Octets of a PE's buffer: a message out and a message in; reals of its
+ * scratch. */
+#define JL_PAR_BUF(M, n, m) (2 * JL_PAR_MSG(M, n, m))
+#define JL_PAR_SCRATCH(M, n, m) (JL_IMM_SCRATCH(M, n, m) + (m))
+
 /* --- the host's side --------------------------------------------------- */
 
 /* Wait for the PEs: PE0 says that all are there and agree on `fingerprint`.
@@ -108,6 +113,7 @@ typedef struct jl_par {
     jl_imm *imm;
     int active;                 /* PEs that own modes                       */
     int ahead;                  /* own modes are already mixed, predicted   */
+    int failed;                 /* JL_OK, or the error of a channel         */
     jl_u32 seq;                 /* of the last measurement                  */
     unsigned long steps;        /* measurements used                        */
     unsigned long refused;      /* ... and refused, with their code         */
@@ -121,14 +127,16 @@ typedef struct jl_par {
 void jl_par_deal(unsigned char *owner, int M, int npe);
 
 /* Bind a PE's part to its filter (all M modes on every PE) and memory: buf
- * [cap] octets, cap >= JL_PAR_MSG(M, n, m); status [M].
+ * [cap] octets, cap >= JL_PAR_BUF(M, n, m); status [M].
  * Returns JL_OK, JL_EDIM (pe, npe, owner), JL_ENOMEM, JL_ETOOLONG (a channel's
  * max_len is below what its messages need); *par is untouched on error. */
 int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
                 unsigned char *buf, int cap, int *status);
 
-/* Serve until the host says stop: say ready, then step after step.  scratch
- * [JL_IMM_SCRATCH(M, n, m)].
+/* Serve until the host says stop: say ready, then step after step.  A
+ * measurement that cannot be used (not of the model's size, not finite, a
+ * number or a time that goes back) is refused: the host is told why.  scratch
+ * [JL_PAR_SCRATCH(M, n, m)], for all three calls.
  * Returns JL_OK after a stop, JL_EMODEL, or the error of the channel that
  * failed. */
 int jl_par_serve(jl_par *par, jl_real *scratch);
@@ -136,8 +144,14 @@ int jl_par_serve(jl_par *par, jl_real *scratch);
 /* One step, when the measurement is already on every PE and every PE calls
  * this: returns on all of them the same JL_OK or code of the first mode that
  * failed, as jl_imm_step; or the error of the channel that failed.  The
- * combined estimate is computed on PE0 (on the others call jl_imm_combine). */
+ * combined estimate is computed on PE0 (on the others call jl_imm_combine).
+ * After the error of a channel the PEs may differ: the run is over. */
 int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch);
+
+/* Mix and predict the own modes before the next measurement is there, if the
+ * model does not change (no `prepare`): the next step is the shorter for it.
+ * Optional, and of no influence on any result. */
+void jl_par_ahead(jl_par *par, jl_real *scratch);
 
 #ifdef __cplusplus
 }

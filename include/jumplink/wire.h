@@ -47,7 +47,10 @@ enum {                          /* kinds of frames */
     JL_FRAME_DATA = 2,          /* a piece of a message, more follow        */
     JL_FRAME_LAST = 3,          /* the last (or only) piece of a message    */
     JL_FRAME_ACK = 4,           /* nothing but the acknowledgement          */
-    JL_FRAME_BYE = 5            /* I close: no more data after this         */
+    JL_FRAME_BYE = 5,           /* I close: no more data after this         */
+    JL_FRAME_DOUBT = 6,         /* I know another session of yours: are you
+                                   there?                                   */
+    JL_FRAME_ALIVE = 7          /* I am: the answer                         */
 };
 
 typedef struct jl_frame {
@@ -57,14 +60,16 @@ typedef struct jl_frame {
     jl_u32 session;             /* the sender's session                     */
     jl_u32 peer;                /* the receiver's session, as the sender
                                    knows it; 0: not yet                     */
-    jl_u32 seq;                 /* number of this piece                     */
+    jl_u32 seq;                 /* number of this piece; ACK: 1 if there is
+                                   room again for what was dropped          */
     jl_u32 ack;                 /* the next piece the sender waits for      */
     const unsigned char *payload;
     int len;                    /* octets of payload, 0 to JL_FRAME_PAYLOAD */
 } jl_frame;
 
 /* Write a frame to buf [cap].
- * Returns its length, or JL_EDIM (a field out of range), JL_ENOMEM (cap).
+ * Returns its length, or JL_EDIM (a field out of range, a session of 0, a
+ * payload where none is allowed), JL_ENOMEM (cap).
  * Aliasing: the payload may already lie at buf + JL_FRAME_HEADER. */
 int jl_frame_encode(unsigned char *buf, int cap, const jl_frame *frame);
 

@@ -1,0 +1,39 @@
+/* The host's side of a run. */
+#include "par/par_msg.h"
+
+int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, unsigned char *buf,
+                  int cap, long timeout_us)
+{
+    int len = jl_chan_recv(from_pe0, buf, cap, timeout_us);
+
+    if (len < 0)
+        return len;
+    if (len != JLI_MSG_HEADER || buf[0] != JLI_READY)
+        return JL_EMSG;
+    return jl_get_u32(buf + 4) == fingerprint ? JL_OK : JL_EMODEL;
+}
+
+int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,
+                 unsigned char *buf, int cap, long timeout_us)
+{
+    if (cap < JL_PAR_MSG(1, 1, m))
+        return JL_ENOMEM;
+    return jl_chan_send(to_pe0, buf, jli_msg_meas(buf, meas, m), timeout_us);
+}
+
+int jl_host_recv(jl_chan *from_pe0, jl_estimate *estimate, int M, int n,
+                 unsigned char *buf, int cap, long timeout_us)
+{
+    int len = jl_chan_recv(from_pe0, buf, cap, timeout_us);
+
+    return len < 0 ? len : jli_msg_estimate_read(estimate, M, n, buf, len);
+}
+
+int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,
+                 long timeout_us)
+{
+    if (cap < JLI_MSG_HEADER)
+        return JL_ENOMEM;
+    return jl_chan_send(to_pe0, buf, jli_msg_plain(buf, JLI_STOP, 0, 0, 0),
+                        timeout_us);
+}

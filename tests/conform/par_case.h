@@ -1,0 +1,188 @@
+/* A bank of modes with measurements, to be filtered on one PE or on several. */
+#ifndef PAR_CASE_H
+#define PAR_CASE_H
+
+#include "close.h"
+
+#include <stdlib.h>
+
+#include "jumplink.h"
+
+#define PAR_M 9                         /* modes at most */
+#define PAR_N 4
+#define PAR_Z 2
+#define PAR_STEPS 60
+
+/* Every PE builds its own. */
+struct par_bank {
+    jl_mode modes[PAR_M];
+    jl_real mode_mem[PAR_M][JL_MODE_MEM(PAR_N, PAR_Z, PAR_Z)];
+    jl_real mem[JL_IMM_STATE(PAR_M, PAR_N)];
+    jl_real scratch[JL_PAR_SCRATCH(PAR_M, PAR_N, PAR_Z)];
+    jl_imm imm;
+};
+
+/* What a run gives, step by step. */
+struct par_trace {
+    int status[PAR_STEPS];
+    jl_real x[PAR_STEPS][PAR_N];
+    jl_real P[PAR_STEPS][PAR_N * PAR_N];
+    jl_real mu[PAR_STEPS][PAR_M];
+    jl_real loglik[PAR_STEPS];
+};
+
+/* M modes; sticky chooses a chain that allows the cheap mixing; form. */
+static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
+                                 const jl_kf_form *form)
+{
+    static const jl_real x0[PAR_N] = { 0, 150, 0, 40 };
+    jl_real Pi[PAR_M * PAR_M], x[PAR_M * PAR_N], mu[PAR_M];
+    jl_real P[PAR_M * PAR_N * PAR_N];
+    int i, j;
+
+    memset(P, 0, sizeof P);
+    for (j = 0; j < M; j++) {
+        jl_motion motion = { JL_MOTION_CT, 2, 2, JL_C(0.5), 0, 20 };
+
+        motion.turn_rate = JL_C(0.02) * (jl_real)(j - M / 2);
+        motion.accel_std = JL_C(0.3) * (jl_real)(j + 1);
+        assert_int_equal(jl_mode_init(&bank->modes[j], PAR_N, PAR_Z, PAR_Z,
+                                      bank->mode_mem[j],
+                                      JL_MODE_MEM(PAR_N, PAR_Z, PAR_Z)), 0);
+        assert_int_equal(jl_mode_motion(&bank->modes[j], &motion, 1), 0);
+        mu[j] = 1 / (jl_real)M;
+        for (i = 0; i < PAR_N; i++) {
+            x[j * PAR_N + i] = x0[i];
+            P[(j * PAR_N + i) * PAR_N + i] = 900;
+        }
+        for (i = 0; i < M; i++) {
+            jl_real out = sticky ? JL_C(0.1)
+                : JL_C(0.02) * (jl_real)(j + 1);    /* leaving mode j */
+
+            Pi[j * M + i] = M == 1 ? 1
+                : i == j ? 1 - out : out / (jl_real)(M - 1);
+        }
+    }
+    assert_int_equal(jl_imm_init(&bank->imm, M, bank->modes, form,
+                                 JL_MIX_AUTO, bank->mem,
+                                 JL_IMM_STATE(PAR_M, PAR_N)), 0);
+    assert_int_equal(jl_imm_chain(&bank->imm, Pi), 0);
+    assert_int_equal(bank->imm.sticky, sticky || M <= 2);
+    assert_int_equal(jl_imm_set(&bank->imm, x, P, mu, bank->scratch), 0);
+}
+
+/* Measurement k: a weaving path with noise; some are missing, one is an
+ * outlier, and two in a row are so large that the step after them must fail. */
+static inline void par_meas(jl_meas *meas, jl_real *z, int k)
+{
+    unsigned r = (unsigned)k * 2654435761u;
+    int i;
+
+    for (i = 0; i < PAR_Z; i++) {
+        r = r * 1664525u + 1013904223u;
+        z[i] = (jl_real)((i == 0 ? 150 : 40) * (k + 1))
+            + (jl_real)(r >> 16) / 2048 - 16
+            + (jl_real)((k * k) % 97);
+    }
+    if (k == 25)
+        z[0] += 20000;
+    if (k == 50)
+        z[1] = JL_LARGE;
+    meas->seq = (jl_u32)k + 1;
+    meas->dt = 1;
+    meas->z = k % 7 == 5 ? NULL : z;
+}
+
+static inline void par_note(struct par_trace *trace, int k, int status,
+                            const jl_real *x, const jl_real *P,
+                            const jl_real *mu, jl_real loglik, int M)
+{
+    trace->status[k] = status;
+    if (status != JL_OK)
+        return;
+    memcpy(trace->x[k], x, sizeof trace->x[k]);
+    memcpy(trace->P[k], P, sizeof trace->P[k]);
+    memcpy(trace->mu[k], mu, (size_t)M * sizeof *mu);
+    trace->loglik[k] = loglik;
+}
+
+/* The reference: jl_imm_step, on one processor. */
+static inline void par_serial(struct par_trace *trace, int M, int sticky,
+                              const jl_kf_form *form)
+{
+    static struct par_bank bank;
+    jl_real z[PAR_Z];
+    jl_meas meas;
+    int k, status;
+
+    memset(trace, 0, sizeof *trace);
+    par_bank_init(&bank, M, sticky, form);
+    for (k = 0; k < PAR_STEPS; k++) {
+        par_meas(&meas, z, k);
+        status = jl_imm_step(&bank.imm, meas.z, bank.scratch);
+        par_note(trace, k, status, bank.imm.xhat, bank.imm.Phat, bank.imm.mu,
+                 bank.imm.loglik, M);
+    }
+}
+
+/* A PE's part; the channels are [npe], the host is the node npe.  Returns what
+ * jl_par_serve returns. */
+static inline int par_pe(int pe, int npe, int M, int sticky,
+                         const jl_kf_form *form, jl_chan **to, jl_chan **from)
+{
+    struct par_bank *bank = malloc(sizeof *bank);
+    unsigned char owner[PAR_M], buf[JL_PAR_BUF(PAR_M, PAR_N, PAR_Z)];
+    int mode_status[PAR_M], status;
+    jl_par_config config = { 0 };
+    jl_par par;
+
+    par_bank_init(bank, M, sticky, form);
+    jl_par_deal(owner, M, npe);
+    config.pe = pe;
+    config.npe = npe;
+    config.owner = owner;
+    config.to = to;
+    config.from = from;
+    config.to_host = to[npe];
+    config.from_host = from[npe];
+    config.fingerprint = 7;
+    config.timeout_us = 5000000;
+    status = jl_par_init(&par, &bank->imm, &config, buf, sizeof buf,
+                         mode_status);
+    if (status == JL_OK)
+        status = jl_par_serve(&par, bank->scratch);
+    free(bank);
+    return status;
+}
+
+/* The host's part: feed all measurements, note all answers, stop. */
+static inline int par_host(struct par_trace *trace, int M, jl_chan *to,
+                           jl_chan *from)
+{
+    unsigned char buf[JL_PAR_MSG(PAR_M, PAR_N, PAR_Z)];
+    jl_real x[PAR_N], P[PAR_N * PAR_N], mu[PAR_M], z[PAR_Z];
+    jl_estimate estimate = { 0 };
+    jl_meas meas;
+    int k, status;
+
+    memset(trace, 0, sizeof *trace);
+    estimate.x = x;
+    estimate.P = P;
+    estimate.mu = mu;
+    status = jl_host_ready(from, 7, buf, sizeof buf, 5000000);
+    for (k = 0; k < PAR_STEPS && status == JL_OK; k++) {
+        par_meas(&meas, z, k);
+        status = jl_host_send(to, &meas, PAR_Z, buf, sizeof buf, 5000000);
+        if (status == JL_OK)
+            status = jl_host_recv(from, &estimate, M, PAR_N, buf, sizeof buf,
+                                  5000000);
+        if (status == JL_OK && estimate.seq != meas.seq)
+            status = JL_EMSG;
+        if (status == JL_OK)
+            par_note(trace, k, estimate.status, x, P, mu, estimate.loglik, M);
+    }
+    return status == JL_OK ? jl_host_stop(to, buf, sizeof buf, 5000000)
+                           : status;
+}
+
+#endif
