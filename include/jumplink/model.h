@@ -81,10 +81,10 @@ typedef struct jl_motion {
 
 /* Sizes of a motion's mode: n = axes order, m = p = axes. */
 
-/* Fill a mode (of the sizes above) for time step dt [s] > 0.  Cheap enough for
- * every step of an irregular record.
+/* Fill a mode (of the sizes above) for time step dt [s] >= 0; over dt = 0
+ * nothing moves.  Cheap enough for every step of an irregular record.
  * Returns JL_OK, JL_EDIM (sizes, axes, order, kind), JL_ENONFINITE, JL_ERANGE
- * (accel_std < 0, sigma_z <= 0, |turn_rate| dt > 1024), JL_ETIME (dt <= 0);
+ * (accel_std < 0, sigma_z <= 0, |turn_rate| dt > 1024), JL_ETIME (dt < 0);
  * *mode is untouched on error. */
 int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt);
 

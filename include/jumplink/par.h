@@ -33,6 +33,7 @@ extern "C" {
  * outgrows a float. */
 typedef struct jl_meas {
     jl_u32 seq;                 /* its number: each greater than the last   */
+    int first;                  /* 1: a new record begins; `prepare` knows  */
     jl_real dt;                 /* [s] >= 0 since the one before            */
     const jl_real *z;           /* [m], or NULL: missing                    */
 } jl_meas;
@@ -87,8 +88,10 @@ int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,
 /* --- the PE's side ----------------------------------------------------- */
 
 /* Called on every PE before a step, with the same arguments everywhere: for
- * models rebuilt for meas->dt (jl_mode_motion, jl_imm_chain), or started from
- * a first measurement.  Must do the same on every PE.
+ * models rebuilt for meas->dt (jl_mode_motion, then jl_imm_chain), or started
+ * from a first measurement (jl_imm_set).  Must do the same on every PE, and if
+ * it changes a mode it must also call jl_imm_chain or jl_imm_set, which void
+ * what was computed ahead.
  * Returns JL_OK (now the step), JL_STARTED (the measurement was used to set
  * the state: no step), or a negative code: the step fails with it. */
 #define JL_STARTED 1
@@ -148,8 +151,8 @@ int jl_par_serve(jl_par *par, jl_real *scratch);
  * After the error of a channel the PEs may differ: the run is over. */
 int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch);
 
-/* Mix and predict the own modes before the next measurement is there, if the
- * model does not change (no `prepare`): the next step is the shorter for it.
+/* Mix and predict the own modes before the next measurement is there: unless
+ * `prepare` then changes the model, the next step is the shorter for it.
  * Optional, and of no influence on any result. */
 void jl_par_ahead(jl_par *par, jl_real *scratch);
 

@@ -1,8 +1,6 @@
 /* The Markov chain between the modes. */
 #include "jumplink/model.h"
 
-#include <stddef.h>
-
 #include "base/mathx.h"
 
 int jl_chain_sojourn(jl_real *Pi, const jl_real *sojourn_s, int M,

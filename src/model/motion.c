@@ -38,7 +38,7 @@ static int motion_numbers(const jl_motion *motion, jl_real dt)
     g = (dt > 2 ? dt * dt / 2 : 2) * v[0];
     if (!jl_vec_within(&g, 1, JL_LARGE))
         return JL_ENONFINITE;
-    return dt > 0 ? JL_OK : JL_ETIME;
+    return dt >= 0 ? JL_OK : JL_ETIME;
 }
 
 /* One axis of CV or CA in the rows and columns from `at`. */

@@ -19,8 +19,8 @@ int jli_msg_meas(unsigned char *buf, const jl_meas *meas, int m)
 {
     unsigned char *p;
 
-    p = buf + jli_msg_plain(buf, JLI_MEAS, 0, meas->z != NULL ? m : 0,
-                            meas->seq);
+    p = buf + jli_msg_plain(buf, JLI_MEAS, meas->first != 0,
+                            meas->z != NULL ? m : 0, meas->seq);
     p = jl_put_reals(p, &meas->dt, 1);
     if (meas->z != NULL)
         p = jl_put_reals(p, meas->z, m);
@@ -35,11 +35,12 @@ int jli_msg_meas_read(jl_meas *meas, jl_real *z, int m,
     if (len < JLI_MSG_HEADER + JL_REAL_OCTETS)
         return JL_ELENGTH;
     count = (int)jl_get_u16(buf + 2);
-    if (buf[0] != JLI_MEAS || buf[1] != 0 || (count != 0 && count != m))
+    if (buf[0] != JLI_MEAS || buf[1] > 1 || (count != 0 && count != m))
         return JL_EMSG;
     if (len != JLI_MSG_HEADER + (1 + count) * JL_REAL_OCTETS)
         return JL_ELENGTH;
     meas->seq = jl_get_u32(buf + 4);
+    meas->first = buf[1];
     buf = jl_get_reals(buf + JLI_MSG_HEADER, &meas->dt, 1);
     (void)jl_get_reals(buf, z, count);
     meas->z = count > 0 ? z : NULL;

@@ -5,7 +5,7 @@
  *
  *     type       octet  16 bits     32 bits      then
  *     READY      pe     npe         fingerprint
- *     MEAS       -      m; 0: lost  seq          dt, z [m]
+ *     MEAS       first  m; 0: lost  seq          dt, z [m]
  *     MODES      pe     count       seq          status (16 bits) [count],
  *                                                (l, x, P packed) [count]
  *     ESTIMATE   -      -status     seq          loglik, x, P packed, mu [M];

@@ -1,7 +1,7 @@
 /* One parallel step: own modes, one exchange, the same weighing everywhere. */
 #include "par/par_msg.h"
 
-#include "mat/mat_k.h"
+#include "imm/imm_stage.h"
 
 /* --- the exchange -------------------------------------------------------- */
 
@@ -102,8 +102,7 @@ static int first_failure(const jl_par *par)
 
 void jl_par_ahead(jl_par *par, jl_real *scratch)
 {
-    if (par->config.prepare == NULL && par->config.pe < par->active
-        && !par->ahead)
+    if (par->config.pe < par->active && !par->ahead)
         go_ahead(par, scratch);
 }
 
@@ -120,7 +119,7 @@ int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch)
         if (status != JL_OK)
             return status == JL_STARTED ? JL_OK : status;
     }
-    if (!par->ahead)
+    if (!par->ahead || imm->stage != JLI_MIXED)
         go_ahead(par, scratch);
     par->ahead = 0;
     for (j = 0; j < imm->M; j++)

@@ -89,6 +89,7 @@ static inline void par_meas(jl_meas *meas, jl_real *z, int k)
     if (k == 50)
         z[1] = JL_LARGE;
     meas->seq = (jl_u32)k + 1;
+    meas->first = 0;
     meas->dt = 1;
     meas->z = k % 7 == 5 ? NULL : z;
 }
