@@ -1,0 +1,516 @@
+#include "port_lcm.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <lcm/lcm.h>
+
+#define RTO_US 20000
+#define ACK_US 5000
+#define SPIN_US 20
+#define QUIET_US (3 * RTO_US)
+#define HANDLE_MAX 64           /* messages between two looks at the clock  */
+#define RUN_MAX 16
+#define NODES_MAX 256
+#define NEVER LLONG_MAX
+#define FROM_AT 5               /* the octet of a frame that names its sender */
+
+/* "JL." run "." node and its 0; LCM's own header before it has 8 octets.  A
+ * message longer than 1400 in all would be cut up by networks, and a lossy one
+ * then stops receiving: the kernel waits for too many missing pieces. */
+#define CHANNEL_MAX (3 + RUN_MAX + 1 + 3 + 1)
+JL_STATIC_ASSERT(8 + CHANNEL_MAX + JL_FRAME_MAX < 1400, frame_fits_a_datagram);
+
+struct end {
+    jl_chan chan;               /* first: ops get a jl_chan and cast it     */
+    jl_lcm *lcm;
+    jl_link *link;
+};
+
+struct peer {
+    jl_link link;
+    unsigned char *mem;
+    char channel[CHANNEL_MAX];
+    struct end tx, rx;
+};
+
+struct jl_lcm {
+    lcm_t *lcm;
+    struct pollfd readable;
+    int node, nodes;
+    struct peer *peers;         /* [nodes]; our own is not used             */
+    long spin_us;
+    double drop;
+    jl_u32 noise;               /* state of the generator for drop          */
+    unsigned long strays;       /* messages that belong to no link          */
+};
+
+static long long clock_us(void)
+{
+    struct timespec t;
+
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec * 1000000LL + t.tv_nsec / 1000;
+}
+
+/* A link's time is modulo 2^32. */
+static jl_u32 link_time(long long now)
+{
+    return (jl_u32)(now & 0xffffffffLL);
+}
+
+/* --- what goes out ------------------------------------------------------ */
+
+static int dropped(jl_lcm *l)
+{
+    l->noise ^= l->noise << 13;
+    l->noise ^= l->noise >> 17;
+    l->noise ^= l->noise << 5;
+    return l->noise < l->drop * 4294967296.0;
+}
+
+/* Send all that is due.  A publish that fails is a lost datagram. */
+static void flush(jl_lcm *l)
+{
+    unsigned char datagram[JL_FRAME_MAX];
+    jl_u32 now = link_time(clock_us());
+    int i, len;
+
+    for (i = 0; i < l->nodes; i++) {
+        struct peer *p = &l->peers[i];
+
+        if (i == l->node)
+            continue;
+        while ((len = jl_link_output(&p->link, datagram, now)) > 0)
+            if (l->drop <= 0 || !dropped(l))
+                lcm_publish(l->lcm, p->channel, datagram, (unsigned)len);
+    }
+}
+
+/* Microseconds until a link wants to send by time alone; -1: none does. */
+static long next_timer(const jl_lcm *l, long long now)
+{
+    long next = -1;
+    int i;
+
+    for (i = 0; i < l->nodes; i++) {
+        long t = i == l->node
+            ? -1 : jl_link_timer(&l->peers[i].link, link_time(now));
+
+        if (t >= 0 && (next < 0 || t < next))
+            next = t;
+    }
+    return next;
+}
+
+/* --- what comes in ------------------------------------------------------ */
+
+/* Anybody may send to a multicast address.  The link looks at all of the
+ * frame; here, only at who says to have sent it (WIRE.md). */
+static void on_message(const lcm_recv_buf_t *buf, const char *channel,
+                       void *context)
+{
+    jl_lcm *l = context;
+    const unsigned char *frame = buf->data;
+    int from;
+
+    (void)channel;
+    from = buf->data_size > FROM_AT ? frame[FROM_AT] : l->nodes;
+    if (from == l->node || from >= l->nodes || buf->data_size > JL_FRAME_MAX)
+        l->strays++;
+    else
+        jl_link_input(&l->peers[from].link, frame, (int)buf->data_size,
+                      link_time(clock_us()));
+}
+
+/* Wait up to us (-1: for ever) for a message; 1: there is one. */
+static int await_message(jl_lcm *l, long us)
+{
+    struct timespec t;
+
+    t.tv_sec = us / 1000000;
+    t.tv_nsec = us % 1000000 * 1000;
+    return ppoll(&l->readable, 1, us < 0 ? NULL : &t, NULL) > 0;
+}
+
+/* Returns how many messages were there, or JL_EIO. */
+static int take_in(jl_lcm *l)
+{
+    int n;
+
+    for (n = 0; n < HANDLE_MAX && await_message(l, 0); n++)
+        if (lcm_handle(l->lcm) != 0)
+            return JL_EIO;
+    return n;
+}
+
+/* Keep all links going, and if nothing has come in, block until something
+ * does, a link's timer, or the deadline.
+ * Returns JL_OK: look again; JL_ETIMEOUT: look a last time; JL_EIO. */
+static int turn(jl_lcm *l, long long deadline)
+{
+    long long now, spin_end;
+    int n;
+
+    flush(l);
+    n = take_in(l);
+    now = clock_us();
+    if (n == 0 && now < deadline) {
+        long us = next_timer(l, now);
+
+        if (deadline != NEVER && (us < 0 || deadline - now < us))
+            us = (long)(deadline - now);
+        spin_end = now + (us < 0 || us > l->spin_us ? l->spin_us : us);
+        while (clock_us() < spin_end && n == 0)
+            n = await_message(l, 0);
+        if (n == 0)
+            await_message(l, us);
+        n = take_in(l);
+    }
+    if (n < 0)
+        return JL_EIO;
+    return now < deadline ? JL_OK : JL_ETIMEOUT;
+}
+
+/* --- the operations of a channel ---------------------------------------- */
+
+static long long deadline_of(long timeout_us)
+{
+    return timeout_us == JL_FOREVER ? NEVER : clock_us() + timeout_us;
+}
+
+static int lcm_chan_send(jl_chan *chan, const unsigned char *msg, int len,
+                         long timeout_us)
+{
+    struct end *e = (struct end *)chan;
+    long long deadline = deadline_of(timeout_us);
+    int status, turned = JL_OK;
+
+    while ((status = jl_link_send(e->link, msg, len)) == JL_EAGAIN) {
+        if (turned != JL_OK)
+            return turned;
+        turned = turn(e->lcm, deadline);
+    }
+    flush(e->lcm);
+    return status;
+}
+
+static int lcm_chan_recv(jl_chan *chan, unsigned char *msg, int cap,
+                         long timeout_us)
+{
+    struct end *e = (struct end *)chan;
+    long long deadline = deadline_of(timeout_us);
+    int status, turned = JL_OK;
+
+    while ((status = jl_link_recv(e->link, msg, cap)) == JL_EAGAIN) {
+        if (turned != JL_OK)
+            return turned;
+        turned = turn(e->lcm, deadline);
+    }
+    flush(e->lcm);
+    return status;
+}
+
+static int lcm_chan_wait(jl_chan *const *chans, int n, long timeout_us)
+{
+    jl_lcm *l = ((struct end *)chans[0])->lcm;
+    long long deadline = deadline_of(timeout_us);
+    int i, turned = JL_OK;
+
+    for (;;) {
+        for (i = 0; i < n; i++)
+            if (jl_link_peek(((struct end *)chans[i])->link) != JL_EAGAIN)
+                return i;
+        if (turned != JL_OK)
+            return turned;
+        turned = turn(l, deadline);
+    }
+}
+
+static const jl_chan_ops lcm_ops = {
+    lcm_chan_send, lcm_chan_recv, lcm_chan_wait
+};
+
+/* --- open and close ----------------------------------------------------- */
+
+static int run_ok(const char *run)
+{
+    size_t i, n = strlen(run);
+
+    for (i = 0; i < n; i++)
+        if (!isalnum((unsigned char)run[i]) && run[i] != '_')
+            return 0;
+    return n >= 1 && n <= RUN_MAX;
+}
+
+static const char *wrong_with(const jl_lcm_config *c)
+{
+    if (c->url == NULL || strncmp(c->url, "udpm://", 7) != 0)
+        return "bad LCM address: udpm://ADDRESS:PORT?ttl=N";
+    if (c->run == NULL || !run_ok(c->run))
+        return "bad name of the run: 1 to 16 letters, digits or _";
+    if (c->nodes < 1 || c->nodes > NODES_MAX || c->node < 0
+        || c->node >= c->nodes)
+        return "node out of range";
+    if (c->max_len < 0 || c->slots < 1
+        || JL_LINK_PIECES(c->max_len)
+               > INT_MAX / 4 / JL_LINK_PIECE / c->slots)
+        return "length or number of messages out of range";
+    return NULL;
+}
+
+/* New for every start, so that nothing from an earlier run is taken. */
+static jl_u32 new_session(void)
+{
+    jl_u32 session = 0;
+
+    while (session == 0)
+        if (getrandom(&session, sizeof session, 0) != sizeof session
+            && errno != EINTR)
+            session = link_time(clock_us()) ^ (jl_u32)getpid();
+    return session;
+}
+
+static void channel_name(char *name, const char *run, int node)
+{
+    snprintf(name, CHANNEL_MAX, "JL.%.*s.%u", RUN_MAX, run,
+             (unsigned)node & 0xff);
+}
+
+static int peer_init(jl_lcm *l, int node, const jl_lcm_config *c,
+                     jl_u32 session)
+{
+    struct peer *p = &l->peers[node];
+    int slots = 2 * c->slots;
+    int octets = JL_LINK_MEM(c->max_len, slots);
+    jl_link_config link;
+
+    /* Twice the slots promised: a link acknowledges at half a window, and what
+     * was received but not acknowledged yet still fills the sender's. */
+    link.number = c->number;
+    link.from = c->node;
+    link.to = node;
+    link.session = session;
+    link.max_len = c->max_len;
+    link.slots = slots;
+    link.rto_us = RTO_US;
+    link.ack_us = ACK_US;
+    p->mem = malloc((size_t)octets);
+    if (p->mem == NULL
+        || jl_link_init(&p->link, &link, p->mem, octets,
+                        link_time(clock_us())) != JL_OK)
+        return 0;
+    channel_name(p->channel, c->run, node);
+    jl_chan_init(&p->tx.chan, &lcm_ops, c->max_len, c->slots);
+    jl_chan_init(&p->rx.chan, &lcm_ops, c->max_len, c->slots);
+    p->tx.lcm = p->rx.lcm = l;
+    p->tx.link = p->rx.link = &p->link;
+    return 1;
+}
+
+static const char *subscribe(jl_lcm *l, const jl_lcm_config *c)
+{
+    char url[256], name[CHANNEL_MAX];
+    const char *more = "recv_buf_size=4194304";
+    lcm_subscription_t *sub;
+    int len;
+
+    if (strstr(c->url, "recv_buf_size=") != NULL)
+        len = snprintf(url, sizeof url, "%s", c->url);
+    else
+        len = snprintf(url, sizeof url, "%s%c%s", c->url,
+                       strchr(c->url, '?') ? '&' : '?', more);
+    if (len < 0 || len >= (int)sizeof url)
+        return "bad LCM address: too long";
+    l->lcm = lcm_create(url);
+    if (l->lcm == NULL)
+        return "no multicast route (ip route add 224.0.0.0/4 dev lo), "
+               "or a bad LCM address";
+    channel_name(name, c->run, c->node);
+    sub = lcm_subscribe(l->lcm, name, on_message, l);
+    if (sub == NULL)
+        return "LCM does not hear itself: does a firewall drop multicast?";
+    lcm_subscription_set_queue_capacity(sub, 0);
+    l->readable.fd = lcm_get_fileno(l->lcm);
+    l->readable.events = POLLIN;
+    return NULL;
+}
+
+/* LCM explains its failures at length on stderr; we return a reason. */
+static const char *subscribe_quietly(jl_lcm *l, const jl_lcm_config *c)
+{
+    int saved = dup(STDERR_FILENO);
+    int null = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    const char *why;
+
+    fflush(stderr);
+    if (saved >= 0 && null >= 0)
+        dup2(null, STDERR_FILENO);
+    why = subscribe(l, c);
+    fflush(stderr);
+    if (saved >= 0) {
+        dup2(saved, STDERR_FILENO);
+        close(saved);
+    }
+    if (null >= 0)
+        close(null);
+    return why;
+}
+
+static void free_all(jl_lcm *l)
+{
+    int i;
+
+    if (l->lcm != NULL)
+        lcm_destroy(l->lcm);
+    for (i = 0; l->peers != NULL && i < l->nodes; i++)
+        free(l->peers[i].mem);
+    free(l->peers);
+    free(l);
+}
+
+static const char *join(jl_lcm *l, const jl_lcm_config *c)
+{
+    jl_u32 session = new_session();
+    int i;
+
+    l->node = c->node;
+    l->nodes = c->nodes;
+    l->drop = c->drop;
+    l->noise = (c->seed * 2654435761U) ^ ((unsigned)c->node + 1) * 40503U;
+    if (l->noise == 0)
+        l->noise = 1;
+    /* Spinning takes the core from a peer unless everybody has one. */
+    l->spin_us = c->nodes <= sysconf(_SC_NPROCESSORS_ONLN) ? SPIN_US : 0;
+    l->peers = calloc((size_t)c->nodes, sizeof *l->peers);
+    if (l->peers == NULL)
+        return "no memory";
+    for (i = 0; i < c->nodes; i++)
+        if (i != c->node && !peer_init(l, i, c, session))
+            return "no memory, or the type of number is neither 8 nor 4";
+    return subscribe_quietly(l, c);
+}
+
+jl_lcm *jl_lcm_open(const jl_lcm_config *config, const char **why)
+{
+    jl_lcm *l;
+
+    *why = wrong_with(config);
+    if (*why != NULL)
+        return NULL;
+    l = calloc(1, sizeof *l);
+    *why = l == NULL ? "no memory" : join(l, config);
+    if (*why == NULL)
+        return l;
+    if (l != NULL)
+        free_all(l);
+    return NULL;
+}
+
+static int every_link(const jl_lcm *l, int (*is)(const jl_link *link))
+{
+    int i;
+
+    for (i = 0; i < l->nodes; i++)
+        if (i != l->node && !is(&l->peers[i].link))
+            return 0;
+    return 1;
+}
+
+static int closed(const jl_link *link)
+{
+    return link->failed != JL_OK;
+}
+
+/* Nothing left to wait for: all is delivered, or the other end has closed,
+ * knows that we know it, and will receive no more. */
+static int settled(const jl_link *link)
+{
+    return jl_link_idle(link)
+        || (closed(link) && link->ack_due == 0 && !link->ack_now);
+}
+
+static int lossy(const jl_lcm *l)
+{
+    jl_link_count count = jl_lcm_count(l);
+
+    return count.resent + count.doubled + count.early > 0;
+}
+
+void jl_lcm_close(jl_lcm *lcm, long linger_us)
+{
+    long long end = clock_us() + linger_us;
+    int i;
+
+    if (lcm == NULL)
+        return;
+    for (i = 0; i < lcm->nodes; i++)
+        if (i != lcm->node)
+            jl_link_close(&lcm->peers[i].link);
+    flush(lcm);                 /* here and below: it may be what settles */
+    while (!every_link(lcm, settled)) {
+        if (turn(lcm, end) != JL_OK)
+            break;
+        flush(lcm);
+    }
+    /* A peer whose BYE we have acknowledged, but the acknowledgement was lost,
+     * repeats it: stay to answer, unless nothing was ever lost. */
+    end = clock_us() + QUIET_US;
+    while (lossy(lcm) || !every_link(lcm, closed))
+        if (turn(lcm, end) != JL_OK)
+            break;
+    flush(lcm);
+    free_all(lcm);
+}
+
+static struct peer *peer_at(jl_lcm *lcm, int node)
+{
+    if (node < 0 || node >= lcm->nodes || node == lcm->node)
+        return NULL;
+    return &lcm->peers[node];
+}
+
+jl_chan *jl_lcm_tx(jl_lcm *lcm, int node)
+{
+    struct peer *p = peer_at(lcm, node);
+
+    return p == NULL ? NULL : &p->tx.chan;
+}
+
+jl_chan *jl_lcm_rx(jl_lcm *lcm, int node)
+{
+    struct peer *p = peer_at(lcm, node);
+
+    return p == NULL ? NULL : &p->rx.chan;
+}
+
+jl_link_count jl_lcm_count(const jl_lcm *lcm)
+{
+    jl_link_count sum;
+    int i;
+
+    memset(&sum, 0, sizeof sum);
+    for (i = 0; i < lcm->nodes; i++) {
+        const jl_link_count *c = &lcm->peers[i].link.count;
+
+        sum.sent += c->sent;
+        sum.resent += c->resent;
+        sum.acks += c->acks;
+        sum.received += c->received;
+        sum.doubled += c->doubled;
+        sum.early += c->early;
+        sum.refused += c->refused;
+        sum.stale += c->stale;
+    }
+    sum.refused += lcm->strays;
+    return sum;
+}
