@@ -201,6 +201,20 @@ static int start(pid_t *child, const char *folder, const char *script)
     return error;
 }
 
+/* Half drawn, or of another run. */
+static void remove_pictures(const char *folder, const char *name)
+{
+    char *png = path_of(folder, name, "png");
+    char *svg = path_of(folder, name, "svg");
+
+    if (png != NULL)
+        unlink(png);
+    if (svg != NULL)
+        unlink(svg);
+    free(png);
+    free(svg);
+}
+
 static int run(const char *folder, const char *name, const char *path)
 {
     const char *script = strrchr(path, '/') + 1;
@@ -219,9 +233,11 @@ static int run(const char *folder, const char *name, const char *path)
         if (errno != EINTR)
             return complain(path, 0, NULL, "cannot wait for gnuplot: %s",
                             strerror(errno));
-    if (status != 0)
+    if (status != 0) {
+        remove_pictures(folder, name);
         return complain(path, 0, NULL, "gnuplot failed (see: cd %s && "
                         "gnuplot %s.gp)", folder, name);
+    }
     return 0;
 }
 

@@ -1,0 +1,141 @@
+#include "bank.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Modes may differ in their number of noises, so each has its own place. */
+static int copy_modes(struct bank *bank)
+{
+    const struct model *model = bank->model;
+    jl_real *mem;
+    int j, need = 0;
+
+    for (j = 0; j < model->M; j++)
+        need += JL_MODE_MEM(model->n, model->m, model->modes[j].p);
+    bank->modes = calloc((size_t)model->M, sizeof *bank->modes);
+    bank->mode_mem = calloc((size_t)need, sizeof *mem);
+    if (bank->modes == NULL || bank->mode_mem == NULL)
+        return -1;
+    mem = bank->mode_mem;
+    for (j = 0; j < model->M; j++) {
+        const jl_mode *from = &model->modes[j];
+        int size = JL_MODE_MEM(from->n, from->m, from->p);
+
+        if (jl_mode_init(&bank->modes[j], from->n, from->m, from->p, mem,
+                         size) != JL_OK)
+            return -1;
+        memcpy(mem, from->F, (size_t)size * sizeof *mem);
+        mem += size;
+    }
+    return 0;
+}
+
+static int open_imm(struct bank *bank, const jl_kf_form *form)
+{
+    int M = bank->model->M, n = bank->model->n, m = bank->model->m;
+    size_t size = sizeof(jl_real);
+
+    bank->mem = calloc((size_t)JL_IMM_STATE(M, n), size);
+    bank->scratch = calloc((size_t)JL_PAR_SCRATCH(M, n, m), size);
+    bank->Pi = calloc((size_t)(M * M), size);
+    bank->x = calloc((size_t)(M * n), size);
+    bank->P = calloc((size_t)(M * n * n), size);
+    if (bank->mem == NULL || bank->scratch == NULL || bank->Pi == NULL
+        || bank->x == NULL || bank->P == NULL)
+        return -1;
+    return jl_imm_init(&bank->imm, M, bank->modes, form, JL_MIX_AUTO,
+                       bank->mem, JL_IMM_STATE(M, n)) == JL_OK ? 0 : -1;
+}
+
+int bank_open(struct bank *bank, const struct model *model,
+              const jl_kf_form *form)
+{
+    memset(bank, 0, sizeof *bank);
+    bank->model = model;
+    bank->dt = -1;
+    if (copy_modes(bank) != 0 || open_imm(bank, form) != 0) {
+        bank_close(bank);
+        return -1;
+    }
+    return 0;
+}
+
+void bank_close(struct bank *bank)
+{
+    free(bank->modes);
+    free(bank->mode_mem);
+    free(bank->mem);
+    free(bank->scratch);
+    free(bank->Pi);
+    free(bank->x);
+    free(bank->P);
+    memset(bank, 0, sizeof *bank);
+}
+
+/* Every mode starts from the same first measurement. */
+static int start_from(struct bank *bank, jl_imm *imm, const jl_real *z)
+{
+    const struct model *model = bank->model;
+    int j, n = model->n, status;
+
+    if (z == NULL)
+        return JL_EORDER;               /* the feed does not let that happen */
+    for (j = 0; j < model->M; j++) {
+        status = jl_motion_start(bank->x + j * n, bank->P + j * n * n,
+                                 &model->motions[j], z, model->v0_std,
+                                 model->a0_std);
+        if (status != JL_OK)
+            return status;
+    }
+    status = jl_imm_set(imm, bank->x, bank->P, model->mu0, bank->scratch);
+    return status == JL_OK ? JL_STARTED : status;
+}
+
+/* Over no time no mode jumps. */
+static int chain_over(struct bank *bank, jl_real dt)
+{
+    const struct model *model = bank->model;
+    int i, M = model->M;
+
+    if (model->Pi == NULL)
+        return jl_chain_sojourn(bank->Pi, model->sojourn_s, M, dt);
+    memcpy(bank->Pi, model->Pi, (size_t)(M * M) * sizeof *bank->Pi);
+    if (model->motions != NULL && !(dt > 0))
+        for (i = 0; i < M * M; i++)
+            bank->Pi[i] = i % (M + 1) == 0;
+    return JL_OK;
+}
+
+static int rebuild(struct bank *bank, jl_imm *imm, jl_real dt)
+{
+    const struct model *model = bank->model;
+    int j, status = chain_over(bank, dt);
+
+    for (j = 0; model->motions != NULL && j < model->M && status == JL_OK; j++)
+        status = jl_mode_motion(&bank->modes[j], &model->motions[j], dt);
+    if (status == JL_OK)
+        status = jl_imm_chain(imm, bank->Pi);
+    bank->dt = status == JL_OK ? dt : -1;
+    return status;
+}
+
+int bank_prepare(void *context, jl_imm *imm, const jl_meas *meas)
+{
+    struct bank *bank = context;
+    const struct model *model = bank->model;
+    int status = JL_OK;
+
+    if (meas->first) {
+        if (model->x0 == NULL)
+            return start_from(bank, imm, meas->z);
+        status = jl_imm_set(imm, model->x0, model->P0, model->mu0,
+                            bank->scratch);
+        bank->dt = -1;
+    }
+    /* Matrices hold for a step, whatever its length; motions for a time. */
+    if (status == JL_OK && (bank->dt < 0 || (model->motions != NULL
+                                             && (meas->dt < bank->dt
+                                                 || meas->dt > bank->dt))))
+        status = rebuild(bank, imm, meas->dt);
+    return status;
+}

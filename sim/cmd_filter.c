@@ -1,0 +1,47 @@
+/* jumplink filter MODEL.json DATA.csv: one filter over a file. */
+#include <stdio.h>
+
+#include "command.h"
+#include "options.h"
+#include "run_file.h"
+
+static const char help[] =
+    "usage: jumplink filter MODEL.json DATA.csv [OPTIONS]\n"
+    "Runs a filter over the measurements in a file and writes its estimates as\n"
+    "CSV: time, x0.., P00,P01.. (upper triangle), mu0.., loglik.\n\n"
+    "  -o, --out FILE         where to (default: standard output)\n"
+    COMMON_HELP
+    DATA_HELP
+    "  --port loop|lcm        run on several PEs: threads that take turns, or\n"
+    "                         processes that talk over LCM\n"
+    "  --pes P                ... this many (default 4)\n"
+    PORT_HELP;
+
+int cmd_filter(int argc, char **argv)
+{
+    static const struct option known[] = { COMMON_OPTIONS, { 0 } };
+    struct options options;
+    int c, status;
+
+    options_init(&options, "filter");
+    while ((c = getopt_long(argc, argv, "o:h", known, NULL)) != -1) {
+        if (c == 'h') {
+            fputs(help, stdout);
+            return 0;
+        }
+        status = options_take(&options, c, optarg);
+        if (status != 0)
+            return status;
+    }
+    if (argc - optind != 2)
+        return misuse("filter", "needs MODEL.json and DATA.csv");
+    if (options.run != NULL)
+        return misuse("filter", "--run goes with jumplink pe and host");
+    if (options.port == PORT_NONE && options.pes > 0)
+        return misuse("filter", "--pes needs --port");
+    if (options.port != PORT_LCM && options.lcm_url != NULL)
+        return misuse("filter", "--lcm-url needs --port lcm");
+    if (options.pes == 0)
+        options.pes = 4;
+    return run_file(argv[optind], argv[optind + 1], &options);
+}

@@ -1,0 +1,46 @@
+/* jumplink host: the host of a run over LCM whose PEs were started by hand. */
+#include <stdio.h>
+
+#include "command.h"
+#include "options.h"
+#include "run_file.h"
+
+static const char help[] =
+    "usage: jumplink host MODEL.json DATA.csv --pes P --lcm-url URL [OPTIONS]\n"
+    "The host of a run on several machines: waits for the PEs (jumplink pe), feeds\n"
+    "them the measurements, and writes the estimates like jumplink filter.\n\n"
+    "  -o, --out FILE         where to (default: standard output)\n"
+    "  --pes P                how many PEs there are\n"
+    "  --run NAME             name of the run, if several share a network\n"
+    "                         (default jumplink)\n"
+    "  --timeout S            longest wait for an answer (default 2)\n"
+    "  --lcm-url URL          LCM address, such as udpm://239.255.76.67:7667?ttl=1\n"
+    COMMON_HELP
+    DATA_HELP;
+
+int cmd_host(int argc, char **argv)
+{
+    static const struct option known[] = { COMMON_OPTIONS, { 0 } };
+    struct options options;
+    int c, status;
+
+    options_init(&options, "host");
+    options.run = "jumplink";
+    options.port = PORT_BY_HAND;
+    while ((c = getopt_long(argc, argv, "o:h", known, NULL)) != -1) {
+        if (c == 'h') {
+            fputs(help, stdout);
+            return 0;
+        }
+        status = options_take(&options, c, optarg);
+        if (status != 0)
+            return status;
+    }
+    if (argc - optind != 2)
+        return misuse("host", "needs MODEL.json and DATA.csv");
+    if (options.pes == 0 || options.lcm_url == NULL)
+        return misuse("host", "needs --pes and --lcm-url");
+    if (options.port != PORT_BY_HAND)
+        return misuse("host", "--port: it is always LCM");
+    return run_file(argv[optind], argv[optind + 1], &options);
+}

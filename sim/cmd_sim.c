@@ -1,0 +1,186 @@
+/* jumplink sim: recorded flights through filters on PEs; table, CSV, plots. */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "command.h"
+#include "complain.h"
+#include "flight_report.h"
+#include "out_file.h"
+#include "progress.h"
+#include "run.h"
+
+#define MODELS_MAX 8
+
+static const char help[] =
+    "usage: jumplink sim [OPTIONS]\n"
+    "Filters a recorded flight on PEs that are processes talking over LCM, once with\n"
+    "every position taken as fresh and once with held positions recognised, for\n"
+    "each model; compares with the serial filter; writes a table, CSV and plots.\n\n"
+    "  --data FILE            the record (default sim/data/carrier_held_1hz.csv),\n"
+    "                         with true velocities v_east_mps, v_north_mps\n"
+    "  --model FILE           a model; may be given several times (default\n"
+    "                         sim/data/two_modes.json, sim/data/eight_modes.json)\n"
+    "  -o, --out DIR          where results go (default build/sim)\n"
+    "  --pes P                PEs (default 4)\n"
+    "  --port lcm|loop        processes over LCM, or threads that take turns\n"
+    COMMON_HELP
+    "  --hold none|detect|column  only this way with held positions\n"
+    "  --z A,B                columns of the position (default east_m,north_m)\n"
+    "  --time NAME            column of the time (default t_s, else k)\n"
+    PORT_HELP;
+
+/* mkdir -p */
+static int make_folder(const char *path)
+{
+    char *copy = strdup(path), *p;
+    int status = 0;
+
+    for (p = copy; status == 0 && p != NULL; ) {
+        p = strchr(p + 1, '/');
+        if (p != NULL)
+            *p = '\0';
+        if (mkdir(copy, 0777) != 0 && errno != EEXIST)
+            status = complain(copy, 0, NULL, "%s", strerror(errno));
+        if (p != NULL)
+            *p = '/';
+    }
+    free(copy);
+    return status;
+}
+
+/* One model, one way with held positions: serial for comparison, then
+ * parallel. */
+static int one_run(struct flight_run *r, const struct model *model,
+                   const struct data_file *data, const struct options *options)
+{
+    struct estimates serial;
+    char what[200];
+    int status;
+
+    if (estimates_open(&serial, data, model) != 0)
+        return 1;
+    if (estimates_open(&r->e, data, model) != 0) {
+        estimates_close(&serial);
+        return 1;
+    }
+    status = run_serial(&serial, model, data, options);
+    if (status == 0) {
+        snprintf(what, sizeof what, "%s, positions %s, %d PEs", r->model,
+                 r->positions, options->pes);
+        progress_begin(what);
+        status = run(&r->e, &r->traffic, model, data, options);
+        progress_begin(NULL);
+    }
+    r->same = status == 0 && estimates_same(&serial, &r->e);
+    estimates_close(&serial);
+    return status;
+}
+
+static int all_runs(struct flight_report *report, struct model *models,
+                    int count, struct options *options)
+{
+    static const enum hold both[] = { HOLD_NONE, HOLD_DETECT };
+    const struct data_file *data = report->data;
+    enum hold wanted = options->hold;
+    int i, h, status = 0;
+
+    for (i = 0; i < count && status == 0; i++)
+        for (h = 0; h < 2 && status == 0; h++) {
+            struct flight_run *r = &report->runs[report->count];
+
+            if (wanted != HOLD_DEFAULT && h > 0)
+                break;
+            options->hold = wanted != HOLD_DEFAULT ? wanted
+                : h == 1 && data->arrived != NULL ? HOLD_COLUMN : both[h];
+            flight_run_name(r, &models[i], options->hold);
+            status = one_run(r, &models[i], data, options);
+            report->count++;
+        }
+    return status;
+}
+
+static int sim(const char *data_path, const char *const *paths, int count,
+               struct options *options)
+{
+    struct flight_report report;
+    struct data_columns columns;
+    struct data_file data;
+    struct model models[MODELS_MAX];
+    int i, read = 0, status = 0;
+
+    columns.z = options->z != NULL ? options->z : "east_m,north_m";
+    columns.time = options->time;
+    columns.extra = FLIGHT_TRUTH;
+    if (data_read(&data, data_path, &columns) != 0)
+        return 2;
+    for (i = 0; i < count && status == 0; i++)
+        if (model_read(&models[i], paths[i]) != 0)
+            status = 2;
+        else {
+            read++;
+            status = run_pick_mode(&models[i], options);
+            if (status == 0 && flight_fits(&models[i]) != 0)
+                status = 2;
+        }
+    if (status == 0)
+        status = make_folder(options->out) != 0 ? 1 : 0;
+    if (status == 0 && flight_report_open(&report, &data, options,
+                                          2 * count) != 0)
+        status = 1;
+    else if (status == 0) {
+        status = all_runs(&report, models, count, options);
+        if (status == 0)
+            status = flight_report_write(&report, options->out);
+        flight_report_close(&report);
+    }
+    for (i = 0; i < read; i++)
+        model_free(&models[i]);
+    data_free(&data);
+    return status;
+}
+
+int cmd_sim(int argc, char **argv)
+{
+    static const struct option known[] = {
+        { "data", required_argument, NULL, 'd' },
+        { "model", required_argument, NULL, 'm' },
+        COMMON_OPTIONS, { 0 }
+    };
+    const char *data = "sim/data/carrier_held_1hz.csv";
+    const char *models[MODELS_MAX] = { "sim/data/two_modes.json",
+                                       "sim/data/eight_modes.json" };
+    struct options options;
+    int c, count = 0, status = 0;
+
+    options_init(&options, "sim");
+    options.port = PORT_LCM;
+    options.pes = 4;
+    options.out = "build/sim";
+    while ((c = getopt_long(argc, argv, "o:h", known, NULL)) != -1) {
+        if (c == 'h') {
+            fputs(help, stdout);
+            return 0;
+        }
+        if (c == 'd')
+            data = optarg;
+        else if (c == 'm' && count < MODELS_MAX)
+            models[count++] = optarg;
+        else if (c == 'm')
+            return misuse("sim", "at most %d times --model", MODELS_MAX);
+        else
+            status = options_take(&options, c, optarg);
+        if (status != 0)
+            return status;
+    }
+    if (optind < argc)
+        return misuse("sim", "unexpected '%s'", argv[optind]);
+    if (options.run != NULL)
+        return misuse("sim", "--run goes with jumplink pe and host");
+    if (options.port != PORT_LCM && options.lcm_url != NULL)
+        return misuse("sim", "--lcm-url needs --port lcm");
+    return sim(data, models, count == 0 ? 2 : count, &options);
+}

@@ -1,0 +1,134 @@
+#include "estimates.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "complain.h"
+
+/* All NaNs have the same bits, so that files and comparisons agree. */
+static jl_real *nans(long count)
+{
+    jl_real *v = malloc((size_t)count * sizeof *v);
+    long i;
+
+    for (i = 0; v != NULL && i < count; i++)
+        v[i] = (jl_real)NAN;
+    return v;
+}
+
+int estimates_open(struct estimates *e, const struct data_file *data,
+                   const struct model *model)
+{
+    long i;
+
+    memset(e, 0, sizeof *e);
+    e->rows = data->rows;
+    e->n = model->n;
+    e->M = model->M;
+    e->x = nans(e->rows * e->n);
+    e->P = nans(e->rows * e->n * e->n);
+    e->mu = nans(e->rows * e->M);
+    e->loglik = nans(e->rows);
+    e->us = malloc((size_t)e->rows * sizeof *e->us);
+    if (e->x == NULL || e->P == NULL || e->mu == NULL || e->loglik == NULL
+        || e->us == NULL) {
+        estimates_close(e);
+        return complain(data->path, 0, NULL, "no memory for its estimates");
+    }
+    for (i = 0; i < e->rows; i++)
+        e->us[i] = NAN;
+    return 0;
+}
+
+void estimates_close(struct estimates *e)
+{
+    free(e->x);
+    free(e->P);
+    free(e->mu);
+    free(e->loglik);
+    free(e->us);
+    memset(e, 0, sizeof *e);
+}
+
+static int same(const jl_real *a, const jl_real *b, long count)
+{
+    return memcmp(a, b, (size_t)count * sizeof *a) == 0;
+}
+
+int estimates_same(const struct estimates *a, const struct estimates *b)
+{
+    long rows = a->rows;
+
+    return rows == b->rows && a->n == b->n && a->M == b->M
+        && same(a->x, b->x, rows * a->n)
+        && same(a->P, b->P, rows * a->n * a->n)
+        && same(a->mu, b->mu, rows * a->M)
+        && same(a->loglik, b->loglik, rows);
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+
+    return (x > y) - (x < y);
+}
+
+long estimates_times(const struct estimates *e, double *median_us,
+                     double *p99_us)
+{
+    double *sorted = malloc((size_t)e->rows * sizeof *sorted);
+    long i, count = 0;
+
+    *median_us = *p99_us = NAN;
+    for (i = 0; sorted != NULL && i < e->rows; i++)
+        if (!isnan(e->us[i]))
+            sorted[count++] = e->us[i];
+    if (count > 0) {
+        qsort(sorted, (size_t)count, sizeof *sorted, ascending);
+        *median_us = sorted[count / 2];
+        *p99_us = sorted[(count - 1) * 99 / 100];
+    }
+    free(sorted);
+    return count;
+}
+
+static void put(FILE *out, jl_real v)
+{
+    if (isnan(v))
+        fputs(",nan", out);
+    else
+        fprintf(out, ",%.17g", (double)v);
+}
+
+int estimates_write(const struct estimates *e, const struct data_file *data,
+                    FILE *out)
+{
+    int n = e->n, a, b;
+    long row;
+
+    fprintf(out, "%s%s", data->run != NULL ? "run," : "", data->time_name);
+    for (a = 0; a < n; a++)
+        fprintf(out, ",x%d", a);
+    for (a = 0; a < n; a++)
+        for (b = a; b < n; b++)
+            fprintf(out, n > 10 ? ",P%d_%d" : ",P%d%d", a, b);
+    for (a = 0; a < e->M; a++)
+        fprintf(out, ",mu%d", a);
+    fputs(",loglik\n", out);
+    for (row = 0; row < e->rows; row++) {
+        if (data->run != NULL)
+            fprintf(out, "%ld,", data->run[row]);
+        fputs(data->time_text[row], out);
+        for (a = 0; a < n; a++)
+            put(out, e->x[row * n + a]);
+        for (a = 0; a < n; a++)
+            for (b = a; b < n; b++)
+                put(out, e->P[(row * n + a) * n + b]);
+        for (a = 0; a < e->M; a++)
+            put(out, e->mu[row * e->M + a]);
+        put(out, e->loglik[row]);
+        fputc('\n', out);
+    }
+    return ferror(out) ? -1 : 0;
+}

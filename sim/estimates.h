@@ -1,0 +1,37 @@
+/* What a run gives, row by row, and the file it goes to. */
+#ifndef SIM_ESTIMATES_H
+#define SIM_ESTIMATES_H
+
+#include <stdio.h>
+
+#include "data_file.h"
+#include "model_file.h"
+
+struct estimates {
+    long rows;
+    int n, M;
+    jl_real *x;                 /* [rows,n]; NaN in rows without estimate   */
+    jl_real *P;                 /* [rows,n,n]                               */
+    jl_real *mu;                /* [rows,M]                                 */
+    jl_real *loglik;            /* [rows]                                   */
+    double *us;                 /* [rows] wall clock of the step; NaN       */
+};
+
+/* Returns 0, or -1 after a message if there is no memory. */
+int estimates_open(struct estimates *e, const struct data_file *data,
+                   const struct model *model);
+void estimates_close(struct estimates *e);
+
+/* 1 if all numbers of both have the same bits (times apart). */
+int estimates_same(const struct estimates *a, const struct estimates *b);
+
+/* Median and 99th percentile of the time per step; number of steps. */
+long estimates_times(const struct estimates *e, double *median_us,
+                     double *p99_us);
+
+/* As CSV: time (and run), x, P upper triangle, mu, loglik.
+ * Returns 0, or -1 if a write failed. */
+int estimates_write(const struct estimates *e, const struct data_file *data,
+                    FILE *out);
+
+#endif

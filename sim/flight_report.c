@@ -1,0 +1,282 @@
+#include "flight_report.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "complain.h"
+#include "out_file.h"
+#include "plot.h"
+
+/* --- names --------------------------------------------------------------- */
+
+int flight_fits(const struct model *model)
+{
+    if (model->motions != NULL && model->motions[0].axes == 2)
+        return 0;
+    return complain(model->path, 0, "axes", "a flight needs motions in 2 axes");
+}
+
+int flight_report_open(struct flight_report *report,
+                       const struct data_file *data,
+                       const struct options *options, int most)
+{
+    report->data = data;
+    report->options = options;
+    report->count = 0;
+    report->runs = calloc((size_t)most, sizeof *report->runs);
+    return report->runs != NULL ? 0
+        : complain(data->path, 0, NULL, "no memory for %d runs", most);
+}
+
+void flight_report_close(struct flight_report *report)
+{
+    int i;
+
+    for (i = 0; i < report->count; i++)
+        estimates_close(&report->runs[i].e);
+    free(report->runs);
+}
+
+void flight_run_name(struct flight_run *run, const struct model *model,
+                     enum hold hold)
+{
+    const char *base = strrchr(model->path, '/');
+
+    base = base == NULL ? model->path : base + 1;
+    run->source = model;
+    snprintf(run->model, sizeof run->model, "%.*s",
+             (int)strcspn(base, "."), base);
+    strcpy(run->positions, hold == HOLD_NONE ? "fresh" : "recognised");
+    snprintf(run->name, sizeof run->name, "%s_%s", run->model,
+             run->positions);
+}
+
+/* --- errors -------------------------------------------------------------- */
+
+/* |v - truth| in a row; NaN where either is missing. */
+static double velocity_error(const struct flight_run *run,
+                             const struct data_file *data, long row)
+{
+    int n = run->e.n, order = run->source->motions[0].order;
+    const jl_real *x = run->e.x + row * n;
+    const double *truth = data->extra + row * data->n_extra;
+
+    return hypot((double)x[1] - truth[0], (double)x[order + 1] - truth[1]);
+}
+
+static double rms_error(const struct flight_run *run,
+                        const struct data_file *data)
+{
+    double sum = 0;
+    long row, count = 0;
+
+    for (row = 0; row < data->rows; row++) {
+        double e = velocity_error(run, data, row);
+
+        if (!isnan(e)) {
+            sum += e * e;
+            count++;
+        }
+    }
+    return sqrt(sum / (double)count);
+}
+
+/* --- files --------------------------------------------------------------- */
+
+static int open_in(struct out_file *out, const char *folder, const char *name,
+                   const char *ending)
+{
+    char path[4096];
+
+    snprintf(path, sizeof path, "%s/%s%s", folder, name, ending);
+    return out_open(out, path);
+}
+
+static int write_estimates(const struct flight_report *r,
+                           const struct flight_run *run, const char *folder)
+{
+    struct out_file out;
+
+    if (open_in(&out, folder, run->name, ".csv") != 0)
+        return -1;
+    return out_close(&out, estimates_write(&run->e, r->data, out.stream) == 0);
+}
+
+/* Time, what was measured, whether the row repeats the one before, and the
+ * velocity error of each run. */
+static int write_track(const struct flight_report *r, const char *folder)
+{
+    const struct data_file *data = r->data;
+    struct feed held = { data, 0, HOLD_DETECT, 0, 0 };
+    struct out_file out;
+    long row;
+    int i;
+
+    if (open_in(&out, folder, "track", ".csv") != 0)
+        return -1;
+    fprintf(out.stream, "%s,east_m,north_m,held", data->time_name);
+    for (i = 0; i < r->count; i++)
+        fprintf(out.stream, ",%s", r->runs[i].name);
+    fputc('\n', out.stream);
+    for (row = 0; row < data->rows; row++) {
+        fprintf(out.stream, "%s,%.9g,%.9g,%d", data->time_text[row],
+                (double)data->z[row * 2], (double)data->z[row * 2 + 1],
+                !feed_arrived(&held, row));
+        for (i = 0; i < r->count; i++)
+            fprintf(out.stream, ",%.9g",
+                    velocity_error(&r->runs[i], data, row));
+        fputc('\n', out.stream);
+    }
+    return out_close(&out, 1);
+}
+
+/* --- table --------------------------------------------------------------- */
+
+static void print_table(const struct flight_report *r, FILE *out)
+{
+    int i;
+
+    fprintf(out, "%s: %ld rows, %d PEs over %s, %s, %s\n", r->data->path,
+            r->data->rows, r->options->pes,
+            r->options->port == PORT_LCM ? "LCM" : "loop",
+            r->options->form == &jl_kf_joseph ? "Joseph" : "standard",
+            JL_REAL_FLOAT ? "float" : "double");
+    fprintf(out, "%-16s %-11s %12s %6s %10s %10s %9s %7s  %s\n", "model",
+            "positions", "velocity err", "steps", "step p50", "step p99",
+            "messages", "resent", "same bits as");
+    fprintf(out, "%-16s %-11s %12s %6s %10s %10s %9s %7s  %s\n", "",
+            "held are", "rms, m/s", "", "us", "us", "", "",
+            "the serial filter");
+    for (i = 0; i < r->count; i++) {
+        const struct flight_run *run = &r->runs[i];
+        double median, p99;
+        long steps = estimates_times(&run->e, &median, &p99);
+
+        fprintf(out, "%-16s %-11s %12.2f %6ld %10.1f %10.1f %9lu %7lu  %s\n",
+                run->model, run->positions, rms_error(run, r->data), steps,
+                median, p99, run->traffic.messages, run->traffic.resent,
+                run->same ? "yes" : "NO");
+    }
+}
+
+static void print_csv(const struct flight_report *r, FILE *out)
+{
+    int i;
+
+    fputs("model,positions,velocity_rms_mps,steps,step_median_us,step_p99_us,"
+          "messages,octets,resent,same_bits\n", out);
+    for (i = 0; i < r->count; i++) {
+        const struct flight_run *run = &r->runs[i];
+        double median, p99;
+        long steps = estimates_times(&run->e, &median, &p99);
+
+        fprintf(out, "%s,%s,%.6g,%ld,%.6g,%.6g,%lu,%lu,%lu,%d\n", run->model,
+                run->positions, rms_error(run, r->data), steps, median, p99,
+                run->traffic.messages, run->traffic.octets,
+                run->traffic.resent, run->same);
+    }
+}
+
+static int write_tables(const struct flight_report *r, const char *folder)
+{
+    struct out_file out;
+
+    if (open_in(&out, folder, "table", ".txt") != 0)
+        return -1;
+    print_table(r, out.stream);
+    if (out_close(&out, 1) != 0
+        || open_in(&out, folder, "table", ".csv") != 0)
+        return -1;
+    print_csv(r, out.stream);
+    return out_close(&out, 1);
+}
+
+/* --- plots --------------------------------------------------------------- */
+
+static int plot_tracks(const struct flight_report *r, const char *folder)
+{
+    struct plot_series series[1 + 2 * 8];
+    char file[16][128], north[16];
+    int i, status;
+
+    snprintf(north, sizeof north, "x%d", r->runs[0].source->motions[0].order);
+    series[0] = (struct plot_series){ "track.csv", "east_m", "north_m",
+                                      "measured", PLOT_DOTS };
+    for (i = 0; i < r->count; i++) {
+        snprintf(file[i], sizeof file[i], "%s.csv", r->runs[i].name);
+        series[1 + i] = (struct plot_series){ file[i], "x0", north,
+                                              r->runs[i].name, PLOT_LINE };
+    }
+    status = plot_track(folder, "track", "Track: measured and estimated",
+                        series, 1 + r->count);
+    return status;
+}
+
+static int plot_velocity_errors(const struct flight_report *r,
+                                const char *folder)
+{
+    struct plot_series series[1 + 2 * 8];
+    int i;
+
+    series[0] = (struct plot_series){ "track.csv", r->data->time_name, "held",
+                                      "position held", PLOT_SHADE };
+    for (i = 0; i < r->count; i++)
+        series[1 + i] = (struct plot_series){ "track.csv", r->data->time_name,
+                                              r->runs[i].name,
+                                              r->runs[i].name, PLOT_LINE };
+    return plot_errors(folder, "velocity_error", "Velocity error",
+                       "velocity error in m/s", series, 1 + r->count);
+}
+
+static int plot_run_modes(const struct flight_report *r,
+                          const struct flight_run *run, const char *folder)
+{
+    enum { MOST = 64 };
+    char label[MOST][48], file[128], name[128], title[160];
+    const char *names[MOST];
+    int j, M = run->source->M;
+
+    for (j = 0; j < M && j < MOST; j++) {
+        const jl_motion *motion = &run->source->motions[j];
+
+        if (motion->kind == JL_MOTION_CT)
+            snprintf(label[j], sizeof label[j], "CT %+g rad/s",
+                     (double)motion->turn_rate);
+        else
+            snprintf(label[j], sizeof label[j], "%s %g m/s^2",
+                     motion->kind == JL_MOTION_CV ? "CV" : "CA",
+                     (double)motion->accel_std);
+        names[j] = label[j];
+    }
+    snprintf(file, sizeof file, "%s.csv", run->name);
+    snprintf(name, sizeof name, "modes_%s", run->name);
+    snprintf(title, sizeof title, "Mode probabilities: %s, held positions %s",
+             run->model, strcmp(run->positions, "fresh") == 0
+             ? "taken as fresh" : "recognised");
+    return plot_modes(folder, name, title, file, r->data->time_name,
+                      M <= MOST ? names : NULL, M);
+}
+
+/* --- all ----------------------------------------------------------------- */
+
+int flight_report_write(const struct flight_report *r, const char *folder)
+{
+    int i, bad = 0;
+
+    for (i = 0; i < r->count; i++)
+        bad |= write_estimates(r, &r->runs[i], folder) != 0;
+    bad |= write_track(r, folder) != 0;
+    bad |= write_tables(r, folder) != 0;
+    if (!bad) {
+        bad |= plot_tracks(r, folder) != 0;
+        bad |= plot_velocity_errors(r, folder) != 0;
+        for (i = 0; i < r->count; i++)
+            bad |= plot_run_modes(r, &r->runs[i], folder) != 0;
+    }
+    print_table(r, stdout);
+    printf("%s %s\n", bad ? "incomplete:" : "tables, CSV and plots:", folder);
+    for (i = 0; i < r->count; i++)
+        bad |= !r->runs[i].same;
+    return bad ? 1 : 0;
+}

@@ -1,0 +1,46 @@
+/* What the runs over a recorded flight gave: table, CSV files, plots. */
+#ifndef SIM_FLIGHT_REPORT_H
+#define SIM_FLIGHT_REPORT_H
+
+#include "run.h"
+
+/* The velocity that the aircraft itself reported: the truth to compare with. */
+#define FLIGHT_TRUTH "v_east_mps,v_north_mps"
+
+struct flight_run {
+    const struct model *source;
+    char model[64];             /* "two_modes"                              */
+    char positions[16];         /* "fresh", "recognised"                    */
+    char name[96];              /* "two_modes_fresh"                        */
+    struct estimates e;
+    struct traffic traffic;
+    int same;                   /* the serial filter's bits                 */
+};
+
+struct flight_report {
+    const struct data_file *data;
+    const struct options *options;
+    struct flight_run *runs;
+    int count;
+};
+
+/* 0 if the model moves in two axes, else -1 after a message. */
+int flight_fits(const struct model *model);
+
+/* Room for `most` runs.  Returns 0, or -1 after a message. */
+int flight_report_open(struct flight_report *report,
+                       const struct data_file *data,
+                       const struct options *options, int most);
+void flight_report_close(struct flight_report *report);
+
+/* Name a run after its model and its way with held positions. */
+void flight_run_name(struct flight_run *run, const struct model *model,
+                     enum hold hold);
+
+/* Print the table and leave table.txt, table.csv, the estimates, errors.csv,
+ * track.csv and the plots in the folder.  Returns the exit status: 1 if a file
+ * or plot could not be made, or if a run has not the serial filter's bits. */
+int flight_report_write(const struct flight_report *report,
+                        const char *folder);
+
+#endif

@@ -1,0 +1,83 @@
+#include "lcm_net.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "clock.h"
+#include "complain.h"
+#include "jumplink/wire.h"
+#include "private_net.h"
+
+#define LINGER_US 1000000L
+
+const char *lcm_net_url(const struct options *options)
+{
+    static char url[80];
+
+    if (options->lcm_url != NULL)
+        return options->lcm_url;
+    if (url[0] != '\0')
+        return url;
+    if (private_net_enter() == 0) {
+        strcpy(url, "udpm://239.255.76.67:7667?ttl=0");
+    } else {
+        int why = errno;
+
+        private_net_shared_url(url, sizeof url, (unsigned)getpid()
+                               * 2654435761u + (unsigned)clock_us());
+        fprintf(stderr, "jumplink: no private network is allowed here (%s): "
+                "using the machine's own, %s\n", strerror(why), url);
+    }
+    return url;
+}
+
+int lcm_node_open(struct lcm_node *node, int which, const char *url,
+                  const char *run, const struct model *model,
+                  const struct options *options)
+{
+    jl_lcm_config config;
+    const char *why = "";
+    int i;
+
+    memset(node, 0, sizeof *node);
+    node->nodes = options->pes + 1;
+    memset(&config, 0, sizeof config);
+    config.url = url;
+    config.run = run;
+    config.node = which;
+    config.nodes = node->nodes;
+    config.number = JL_REAL_OCTETS;
+    config.max_len = run_max_len(model);
+    config.slots = 2;
+    node->lcm = jl_lcm_open(&config, &why);
+    if (node->lcm == NULL) {
+        complain(url, 0, NULL, "LCM cannot be used: %s", why);
+        return 1;
+    }
+    for (i = 0; i < node->nodes; i++)
+        if (i != which) {
+            node->to[i] = jl_lcm_tx(node->lcm, i);
+            node->from[i] = jl_lcm_rx(node->lcm, i);
+        }
+    return 0;
+}
+
+void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic)
+{
+    int i;
+
+    for (i = 0; i < node->nodes; i++)
+        if (node->to[i] != NULL) {
+            traffic->messages += node->to[i]->messages;
+            traffic->octets += node->to[i]->octets;
+        }
+    traffic->resent += jl_lcm_count(node->lcm).resent;
+}
+
+void lcm_node_close(struct lcm_node *node)
+{
+    jl_lcm_close(node->lcm, LINGER_US);
+    memset(node, 0, sizeof *node);
+}

@@ -1,0 +1,34 @@
+/* Which network a run over LCM uses, and a node on it. */
+#ifndef SIM_LCM_NET_H
+#define SIM_LCM_NET_H
+
+#include "jumplink/chan.h"
+#include "lcm/port_lcm.h"
+#include "options.h"
+#include "run.h"
+
+/* The address for the PEs of runs that this process starts: the one of
+ * --lcm-url as it is; else a private network, which the process enters at the
+ * first call; else, said in one line, the machine's own with ttl 0 and an
+ * address of the run's own. */
+const char *lcm_net_url(const struct options *options);
+
+/* A node of a run and its channels. */
+struct lcm_node {
+    jl_lcm *lcm;
+    int nodes;
+    jl_chan *to[JL_MAX_PES + 1], *from[JL_MAX_PES + 1];
+};
+
+/* Join as node `node` of pes + 1.  Returns 0, or 1 after a message. */
+int lcm_node_open(struct lcm_node *node, int which, const char *url,
+                  const char *run, const struct model *model,
+                  const struct options *options);
+
+/* What this node sent. */
+void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic);
+
+/* Leave, when all that was sent has arrived or a second has passed. */
+void lcm_node_close(struct lcm_node *node);
+
+#endif

@@ -1,0 +1,133 @@
+/* Options that several subcommands share. */
+#include "options.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "jumplink/config.h"
+
+int misuse(const char *command, const char *format, ...)
+{
+    va_list arguments;
+
+    fprintf(stderr, "jumplink %s: ", command);
+    va_start(arguments, format);
+    vfprintf(stderr, format, arguments);
+    va_end(arguments);
+    fprintf(stderr, " (see jumplink %s --help)\n", command);
+    return 2;
+}
+
+void options_init(struct options *options, const char *command)
+{
+    memset(options, 0, sizeof *options);
+    options->command = command;
+    options->mode = -1;
+    options->form = &jl_kf_joseph;
+    options->timeout_us = 2000000;
+}
+
+int option_long(long *number, const char *command, const char *option,
+                const char *value, long low, long high)
+{
+    char *end;
+    long n;
+
+    errno = 0;
+    n = strtol(value, &end, 10);
+    if (end == value || *end != '\0' || errno != 0 || n < low || n > high)
+        return misuse(command, "--%s %s: must be a whole number from %ld to "
+                      "%ld", option, value, low, high);
+    *number = n;
+    return 0;
+}
+
+int option_seconds(long *us, const char *command, const char *option,
+                   const char *value)
+{
+    char *end;
+    double s = strtod(value, &end);
+
+    if (end == value || *end != '\0' || !(s >= 0.001 && s <= 2000))
+        return misuse(command, "--%s %s: must be seconds from 0.001 to 2000",
+                      option, value);
+    *us = lrint(s * 1e6);
+    return 0;
+}
+
+/* The index of value among names (ending in NULL), or -1 after a message. */
+static int choose(const char *command, const char *option, const char *value,
+                  const char *const *names)
+{
+    int i;
+
+    for (i = 0; names[i] != NULL; i++)
+        if (strcmp(value, names[i]) == 0)
+            return i;
+    (void)misuse(command, "--%s %s: unknown; known are%s %s%s%s%s%s", option,
+                 value, "", names[0], i > 1 ? ", " : "", i > 1 ? names[1] : "",
+                 i > 2 ? ", " : "", i > 2 ? names[2] : "");
+    return -1;
+}
+
+int options_take(struct options *o, int c, const char *value)
+{
+    static const char *const filters[] = { "imm", "kf", NULL };
+    static const char *const forms[] = { "joseph", "standard", NULL };
+    static const char *const holds[] = { "none", "detect", "column", NULL };
+    static const char *const ports[] = { "loop", "lcm", NULL };
+    long number = 0;
+    int i, status = 0;
+
+    switch (c) {
+    case 1001:
+        i = choose(o->command, "filter", value, filters);
+        o->kf = i;
+        return i < 0 ? 2 : 0;
+    case 1002:
+        status = option_long(&number, o->command, "mode", value, 0,
+                             JL_MAX_MODES - 1);
+        o->mode = (int)number;
+        return status;
+    case 1003:
+        i = choose(o->command, "form", value, forms);
+        o->form = i == 1 ? &jl_kf_standard : &jl_kf_joseph;
+        return i < 0 ? 2 : 0;
+    case 1004:
+        i = choose(o->command, "hold", value, holds);
+        o->hold = (enum hold)(i + HOLD_NONE);
+        return i < 0 ? 2 : 0;
+    case 1005:
+        i = choose(o->command, "port", value, ports);
+        o->port = (enum port)(i + PORT_LOOP);
+        return i < 0 ? 2 : 0;
+    case 1006:
+        status = option_long(&number, o->command, "pes", value, 1,
+                             JL_MAX_PES);
+        o->pes = (int)number;
+        return status;
+    case 1007:
+        return option_seconds(&o->timeout_us, o->command, "timeout", value);
+    case 1008:
+        o->lcm_url = value;
+        return 0;
+    case 1009:
+        o->run = value;
+        return 0;
+    case 1010:
+        o->z = value;
+        return 0;
+    case 1011:
+        o->time = value;
+        return 0;
+    case 'o':
+        o->out = value;
+        return 0;
+    default:                            /* getopt has said what is wrong */
+        return misuse(o->command, "wrong use");
+    }
+}

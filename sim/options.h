@@ -1,0 +1,84 @@
+/* What the subcommands that run a filter have in common. */
+#ifndef SIM_OPTIONS_H
+#define SIM_OPTIONS_H
+
+#include <getopt.h>
+
+#include "jumplink/kf.h"
+
+enum hold {                     /* which rows count as arrived */
+    HOLD_DEFAULT,               /* column if there is one, else none        */
+    HOLD_NONE,                  /* all that have a z                        */
+    HOLD_DETECT,                /* ... and do not repeat the row before     */
+    HOLD_COLUMN                 /* ... and say so in column `arrived`       */
+};
+
+/* BY_HAND: over LCM, with PEs that somebody else starts. */
+enum port { PORT_NONE, PORT_LOOP, PORT_LCM, PORT_BY_HAND };
+
+struct options {
+    const char *command;        /* for messages: "filter"                   */
+    int kf;                     /* 0: imm, 1: kf of one mode                */
+    int mode;                   /* ... this one; -1: the only one           */
+    const jl_kf_form *form;
+    enum hold hold;
+    enum port port;             /* PORT_NONE: serial                        */
+    int pes;
+    long timeout_us;            /* of each answer in a parallel run         */
+    const char *lcm_url;        /* NULL: a private network                  */
+    const char *run;            /* name of an LCM run, or NULL              */
+    const char *z, *time;       /* columns of the data                      */
+    const char *out;            /* -o or --out                              */
+};
+
+/* The long options above, for getopt_long; their values are beyond any
+ * character, and those of a command's own options are its characters. */
+#define COMMON_OPTIONS \
+    { "filter", required_argument, NULL, 1001 }, \
+    { "mode", required_argument, NULL, 1002 }, \
+    { "form", required_argument, NULL, 1003 }, \
+    { "hold", required_argument, NULL, 1004 }, \
+    { "port", required_argument, NULL, 1005 }, \
+    { "pes", required_argument, NULL, 1006 }, \
+    { "timeout", required_argument, NULL, 1007 }, \
+    { "lcm-url", required_argument, NULL, 1008 }, \
+    { "run", required_argument, NULL, 1009 }, \
+    { "z", required_argument, NULL, 1010 }, \
+    { "time", required_argument, NULL, 1011 }, \
+    { "out", required_argument, NULL, 'o' }, \
+    { "help", no_argument, NULL, 'h' }
+
+#define COMMON_HELP \
+    "  --filter imm|kf        the filter (default imm); kf is the Kalman filter of\n" \
+    "  --mode J               this one mode, from 0 (default: the only one)\n" \
+    "  --form joseph|standard how covariances are updated (default joseph)\n"
+#define DATA_HELP \
+    "  --hold none|detect|column  which measurements count as lost: none; those\n" \
+    "                         that repeat the row before exactly; those with 0 in\n" \
+    "                         column arrived (default: column if there is one, else\n" \
+    "                         none)\n" \
+    "  --z A,B,..             columns of the measurement (default z0,z1,..)\n" \
+    "  --time NAME            column of the time (default t_s, else k)\n"
+#define PORT_HELP \
+    "  --timeout S            longest wait for an answer (default 2)\n" \
+    "  --lcm-url URL          LCM address, on the network as it is (default: a\n" \
+    "                         private network for this run)\n"
+
+void options_init(struct options *options, const char *command);
+
+/* Take the option `c` of the common ones with its value.
+ * Returns 0, or 2 (the exit status) after a message. */
+int options_take(struct options *options, int c, const char *value);
+
+/* A whole number, or seconds, out of an option's value, within [low, high].
+ * Return 0, or 2 after a message that names the option. */
+int option_long(long *number, const char *command, const char *option,
+                const char *value, long low, long high);
+int option_seconds(long *us, const char *command, const char *option,
+                   const char *value);
+
+/* "jumplink COMMAND: message, see jumplink COMMAND --help"; returns 2. */
+int misuse(const char *command, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
+
+#endif

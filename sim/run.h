@@ -1,0 +1,67 @@
+/* A filter over a record: on one processor, or spread over PEs. */
+#ifndef SIM_RUN_H
+#define SIM_RUN_H
+
+#include "estimates.h"
+#include "feed.h"
+#include "jumplink/chan.h"
+#include "options.h"
+
+/* What went over the channels of a run, all PEs and the host together. */
+struct traffic {
+    unsigned long messages;
+    unsigned long octets;
+    unsigned long resent;       /* datagrams sent again                     */
+};
+
+/* Each runs the filter over all rows of the record into *e.  On failure prints
+ * one line (which row, what) and returns the program's exit status, 1; what
+ * was estimated before is in *e.  Otherwise returns 0. */
+int run_serial(struct estimates *e, const struct model *model,
+               const struct data_file *data, const struct options *options);
+int run_loop(struct estimates *e, struct traffic *traffic,
+             const struct model *model, const struct data_file *data,
+             const struct options *options);
+int run_lcm(struct estimates *e, struct traffic *traffic,
+            const struct model *model, const struct data_file *data,
+            const struct options *options);
+
+int run_by_hand(struct estimates *e, struct traffic *traffic,
+                const struct model *model, const struct data_file *data,
+                const struct options *options);
+
+/* One of these, as the options say. */
+int run(struct estimates *e, struct traffic *traffic,
+        const struct model *model, const struct data_file *data,
+        const struct options *options);
+
+/* --- the two sides of a parallel run, for any port ----------------------- */
+
+/* What PEs and host must agree about, in one number. */
+jl_u32 run_fingerprint(const struct model *model,
+                       const struct options *options);
+
+/* Octets of the longest message of the model, and of channels that hold it. */
+int run_max_len(const struct model *model);
+
+/* PE pe's part, until the host says stop; to and from have options->pes + 1
+ * entries, of which the last is the host's.  Returns a code of base.h. */
+int run_pe(int pe, const struct model *model, const struct options *options,
+           jl_chan **to, jl_chan **from);
+
+/* The host's part.  When an answer does not come in time, `alive` (may be
+ * NULL) is asked why: it may print a line and return 0 to end the run. */
+struct run_host {
+    jl_chan *to, *from;
+    int (*alive)(void *context);
+    void *context;
+};
+int run_host(struct estimates *e, const struct run_host *host,
+             const struct model *model, const struct data_file *data,
+             const struct options *options);
+
+/* The model with only the mode that the kf of options works on.
+ * Returns 0, or 2 after a message. */
+int run_pick_mode(struct model *model, const struct options *options);
+
+#endif

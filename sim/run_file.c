@@ -1,0 +1,55 @@
+#include "run_file.h"
+
+#include "out_file.h"
+#include "progress.h"
+#include "run.h"
+
+static int write_estimates(const struct estimates *e,
+                           const struct data_file *data, const char *path)
+{
+    struct out_file out;
+
+    if (out_open(&out, path) != 0)
+        return 1;
+    return out_close(&out, estimates_write(e, data, out.stream) == 0) == 0
+        ? 0 : 1;
+}
+
+static int run_data(const struct model *model, const struct data_file *data,
+                    const struct options *options)
+{
+    struct estimates e;
+    struct traffic traffic;
+    int status;
+
+    if (estimates_open(&e, data, model) != 0)
+        return 1;
+    progress_begin(data->path);
+    status = run(&e, &traffic, model, data, options);
+    progress_begin(NULL);
+    if (status == 0)
+        status = write_estimates(&e, data, options->out);
+    estimates_close(&e);
+    return status;
+}
+
+int run_file(const char *model_path, const char *data_path,
+             const struct options *options)
+{
+    struct data_columns columns = { options->z, options->time, NULL };
+    struct model model;
+    struct data_file data;
+    int status;
+
+    if (model_read(&model, model_path) != 0)
+        return 2;
+    status = run_pick_mode(&model, options);
+    if (status == 0 && data_read(&data, data_path, &columns) != 0)
+        status = 2;
+    if (status == 0) {
+        status = run_data(&model, &data, options);
+        data_free(&data);
+    }
+    model_free(&model);
+    return status;
+}
