@@ -8,12 +8,13 @@ static int copy_modes(struct bank *bank)
 {
     const struct model *model = bank->model;
     jl_real *mem;
-    int j, need = 0;
+    int j;
+    size_t need = 0;
 
     for (j = 0; j < model->M; j++)
-        need += JL_MODE_MEM(model->n, model->m, model->modes[j].p);
+        need += (size_t)JL_MODE_MEM(model->n, model->m, model->modes[j].p);
     bank->modes = calloc((size_t)model->M, sizeof *bank->modes);
-    bank->mode_mem = calloc((size_t)need, sizeof *mem);
+    bank->mode_mem = calloc(need, sizeof *mem);
     if (bank->modes == NULL || bank->mode_mem == NULL)
         return -1;
     mem = bank->mode_mem;
@@ -36,7 +37,7 @@ static int open_imm(struct bank *bank, const jl_kf_form *form)
     size_t size = sizeof(jl_real);
 
     bank->mem = calloc((size_t)JL_IMM_STATE(M, n), size);
-    bank->scratch = calloc((size_t)JL_PAR_SCRATCH(M, n, m), size);
+    bank->scratch = calloc((size_t)JL_IMM_SCRATCH(M, n, m), size);
     bank->Pi = calloc((size_t)(M * M), size);
     bank->x = calloc((size_t)(M * n), size);
     bank->P = calloc((size_t)(M * n * n), size);

@@ -127,11 +127,12 @@ int run_pe(int pe, const struct model *model, const struct options *options,
     unsigned char *owner = calloc((size_t)M, 1);
     unsigned char *buf = malloc((size_t)cap);
     int *mode_status = calloc((size_t)M, sizeof *mode_status);
+    jl_real *z = calloc((size_t)model->m, sizeof *z);
     jl_par_config config;
     struct bank bank;
     jl_par par;
 
-    if (owner == NULL || buf == NULL || mode_status == NULL
+    if (owner == NULL || buf == NULL || mode_status == NULL || z == NULL
         || bank_open(&bank, model, options->form) != 0) {
         status = JL_ENOMEM;
     } else {
@@ -148,7 +149,8 @@ int run_pe(int pe, const struct model *model, const struct options *options,
         config.context = &bank;
         config.fingerprint = run_fingerprint(model, options);
         config.timeout_us = options->timeout_us;
-        status = jl_par_init(&par, &bank.imm, &config, buf, cap, mode_status);
+        status = jl_par_init(&par, &bank.imm, &config, buf, cap, mode_status,
+                             z);
         if (status == JL_OK)
             status = jl_par_serve(&par, bank.scratch);
         bank_close(&bank);
@@ -156,6 +158,7 @@ int run_pe(int pe, const struct model *model, const struct options *options,
     free(owner);
     free(buf);
     free(mode_status);
+    free(z);
     return status;
 }
 

@@ -56,10 +56,8 @@ typedef struct jl_estimate {
     (16 + (M) * JL_PAR_MODE(n) \
      + ((M) + (m) + 2 + (n) + JL_PACKED(n)) * JL_REAL_OCTETS)
 
-/* Octets of a PE's buffer: a message out and a message in; reals of its
- * scratch. */
+/* Octets of a PE's buffer: a message out and a message in. */
 #define JL_PAR_BUF(M, n, m) (2 * JL_PAR_MSG(M, n, m))
-#define JL_PAR_SCRATCH(M, n, m) (JL_IMM_SCRATCH(M, n, m) + (m))
 
 /* --- the host's side --------------------------------------------------- */
 
@@ -123,6 +121,7 @@ typedef struct jl_par {
     unsigned char *buf;         /* [cap]                                    */
     int cap;
     int *status;                /* [M] of the modes, in the present step    */
+    jl_real *z;                 /* [m] the present measurement              */
 } jl_par;
 
 /* The owner table that deals modes out in turn, j to PE j mod npe: the mapping
@@ -130,16 +129,16 @@ typedef struct jl_par {
 void jl_par_deal(unsigned char *owner, int M, int npe);
 
 /* Bind a PE's part to its filter (all M modes on every PE) and memory: buf
- * [cap] octets, cap >= JL_PAR_BUF(M, n, m); status [M].
+ * [cap] octets, cap >= JL_PAR_BUF(M, n, m); status [M]; z [m].
  * Returns JL_OK, JL_EDIM (pe, npe, owner), JL_ENOMEM, JL_ETOOLONG (a channel's
  * max_len is below what its messages need); *par is untouched on error. */
 int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
-                unsigned char *buf, int cap, int *status);
+                unsigned char *buf, int cap, int *status, jl_real *z);
 
 /* Serve until the host says stop: say ready, then step after step.  A
  * measurement that cannot be used (not of the model's size, not finite, a
  * number or a time that goes back) is refused: the host is told why.  scratch
- * [JL_PAR_SCRATCH(M, n, m)], for all three calls.
+ * [JL_IMM_SCRATCH(M, n, m)], for all three calls; `prepare` may use it too.
  * Returns JL_OK after a stop, JL_EMODEL, or the error of the channel that
  * failed. */
 int jl_par_serve(jl_par *par, jl_real *scratch);

@@ -32,7 +32,7 @@ static int count_active(const unsigned char *owner, int M, int npe)
 }
 
 int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
-                unsigned char *buf, int cap, int *status)
+                unsigned char *buf, int cap, int *status, jl_real *z)
 {
     int pe, need = JL_PAR_MSG(imm->M, imm->n, imm->m), active;
 
@@ -58,6 +58,7 @@ int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
     par->buf = buf;
     par->cap = cap;
     par->status = status;
+    par->z = z;
     return JL_OK;
 }
 
@@ -118,16 +119,17 @@ static int pass_on(jl_par *par, int len, int last)
 }
 
 /* Read a measurement from buf, or say why it is refused. */
-static int accept_meas(jl_par *par, jl_meas *meas, jl_real *z, int len)
+static int accept_meas(jl_par *par, jl_meas *meas, int len)
 {
-    int status = jli_msg_meas_read(meas, z, par->imm->m, par->buf, len);
+    int m = par->imm->m;
+    int status = jli_msg_meas_read(meas, par->z, m, par->buf, len);
 
     if (status != JL_OK)
         return status;
     if (par->steps + par->refused > 0 && meas->seq <= par->seq)
         return JL_EMSG;
     if (!jli_finite(meas->dt)
-        || (meas->z != NULL && !jl_vec_within(z, par->imm->m, JL_LARGE)))
+        || (meas->z != NULL && !jl_vec_within(par->z, m, JL_LARGE)))
         return JL_ENONFINITE;
     return meas->dt < 0 ? JL_ETIME : JL_OK;
 }
@@ -145,13 +147,13 @@ static int answer(jl_par *par, jl_u32 seq, int status)
 
 /* One measurement, in buf [len]: refused, or a step.  Returns the error of a
  * channel; a failed step is no error here, the host is told. */
-static int serve_meas(jl_par *par, int len, jl_real *z, jl_real *scratch)
+static int serve_meas(jl_par *par, int len, jl_real *scratch)
 {
     jl_meas meas;
     int status;
 
     meas.seq = 0;
-    status = accept_meas(par, &meas, z, len);
+    status = accept_meas(par, &meas, len);
     if (status != JL_OK) {
         par->refused++;
         return answer(par, meas.seq, status);
@@ -172,19 +174,17 @@ static int serve_meas(jl_par *par, int len, jl_real *z, jl_real *scratch)
 
 int jl_par_serve(jl_par *par, jl_real *scratch)
 {
-    jl_real *z = scratch;
     jl_chan *from = par->config.pe == 0 ? par->config.from_host
                                         : par->config.from[0];
     int status = ready(par), len;
 
-    scratch += par->imm->m;
     while (status == JL_OK) {
         len = jl_chan_recv(from, par->buf, par->cap, JL_FOREVER);
         if (len < 0)
             return len;
         if (len == JLI_MSG_HEADER && par->buf[0] == JLI_STOP)
             return pass_on(par, len, par->config.npe);
-        status = serve_meas(par, len, z, scratch);
+        status = serve_meas(par, len, scratch);
     }
     return status;
 }

@@ -18,7 +18,9 @@ struct par_bank {
     jl_mode modes[PAR_M];
     jl_real mode_mem[PAR_M][JL_MODE_MEM(PAR_N, PAR_Z, PAR_Z)];
     jl_real mem[JL_IMM_STATE(PAR_M, PAR_N)];
-    jl_real scratch[JL_PAR_SCRATCH(PAR_M, PAR_N, PAR_Z)];
+    jl_real scratch[JL_IMM_SCRATCH(PAR_M, PAR_N, PAR_Z)];
+    jl_real Pi[PAR_M * PAR_M];
+    jl_motion motions[PAR_M];
     jl_imm imm;
 };
 
@@ -36,8 +38,7 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
                                  const jl_kf_form *form)
 {
     static const jl_real x0[PAR_N] = { 0, 150, 0, 40 };
-    jl_real Pi[PAR_M * PAR_M], x[PAR_M * PAR_N], mu[PAR_M];
-    jl_real P[PAR_M * PAR_N * PAR_N];
+    jl_real x[PAR_M * PAR_N], mu[PAR_M], P[PAR_M * PAR_N * PAR_N];
     int i, j;
 
     memset(P, 0, sizeof P);
@@ -49,6 +50,7 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
         assert_int_equal(jl_mode_init(&bank->modes[j], PAR_N, PAR_Z, PAR_Z,
                                       bank->mode_mem[j],
                                       JL_MODE_MEM(PAR_N, PAR_Z, PAR_Z)), 0);
+        bank->motions[j] = motion;
         assert_int_equal(jl_mode_motion(&bank->modes[j], &motion, 1), 0);
         mu[j] = 1 / (jl_real)M;
         for (i = 0; i < PAR_N; i++) {
@@ -59,16 +61,31 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
             jl_real out = sticky ? JL_C(0.1)
                 : JL_C(0.02) * (jl_real)(j + 1);    /* leaving mode j */
 
-            Pi[j * M + i] = M == 1 ? 1
+            bank->Pi[j * M + i] = M == 1 ? 1
                 : i == j ? 1 - out : out / (jl_real)(M - 1);
         }
     }
     assert_int_equal(jl_imm_init(&bank->imm, M, bank->modes, form,
                                  JL_MIX_AUTO, bank->mem,
                                  JL_IMM_STATE(PAR_M, PAR_N)), 0);
-    assert_int_equal(jl_imm_chain(&bank->imm, Pi), 0);
+    assert_int_equal(jl_imm_chain(&bank->imm, bank->Pi), 0);
     assert_int_equal(bank->imm.sticky, sticky || M <= 2);
     assert_int_equal(jl_imm_set(&bank->imm, x, P, mu, bank->scratch), 0);
+}
+
+/* A model that changes now and then, in a prepare that spoils the scratch. */
+static inline int par_prepare(void *context, jl_imm *imm, const jl_meas *meas)
+{
+    struct par_bank *bank = context;
+    int j, status = JL_OK;
+
+    memset(bank->scratch, 0xff, sizeof bank->scratch);
+    if (meas->seq % 10 != 0)
+        return JL_OK;
+    for (j = 0; j < imm->M && status == JL_OK; j++)
+        status = jl_mode_motion(&bank->modes[j], &bank->motions[j],
+                                meas->seq % 20 == 0 ? JL_C(1.25) : 1);
+    return status == JL_OK ? jl_imm_chain(imm, bank->Pi) : status;
 }
 
 /* Measurement k: a weaving path with noise; some are missing, one is an
@@ -120,7 +137,9 @@ static inline void par_serial(struct par_trace *trace, int M, int sticky,
     par_bank_init(&bank, M, sticky, form);
     for (k = 0; k < PAR_STEPS; k++) {
         par_meas(&meas, z, k);
-        status = jl_imm_step(&bank.imm, meas.z, bank.scratch);
+        status = par_prepare(&bank, &bank.imm, &meas);
+        if (status == JL_OK)
+            status = jl_imm_step(&bank.imm, meas.z, bank.scratch);
         par_note(trace, k, status, bank.imm.xhat, bank.imm.Phat, bank.imm.mu,
                  bank.imm.loglik, M);
     }
@@ -135,6 +154,7 @@ static inline int par_pe(int pe, int npe, int M, int sticky,
     unsigned char owner[PAR_M], buf[JL_PAR_BUF(PAR_M, PAR_N, PAR_Z)];
     int mode_status[PAR_M], status;
     jl_par_config config = { 0 };
+    jl_real z[PAR_Z];
     jl_par par;
 
     par_bank_init(bank, M, sticky, form);
@@ -146,10 +166,12 @@ static inline int par_pe(int pe, int npe, int M, int sticky,
     config.from = from;
     config.to_host = to[npe];
     config.from_host = from[npe];
+    config.prepare = par_prepare;
+    config.context = bank;
     config.fingerprint = 7;
     config.timeout_us = 5000000;
     status = jl_par_init(&par, &bank->imm, &config, buf, sizeof buf,
-                         mode_status);
+                         mode_status, z);
     if (status == JL_OK)
         status = jl_par_serve(&par, bank->scratch);
     free(bank);

@@ -210,6 +210,7 @@ static void test_par_init_refuses_what_does_not_fit(void **state)
     static struct par_bank bank;
     unsigned char owner[PAR_M], buf[JL_PAR_BUF(PAR_M, PAR_N, PAR_Z)];
     int mode_status[PAR_M];
+    jl_real z[PAR_Z];
     jl_chan small = { 0 }, *chans[2];
     jl_par_config config = { 0 };
     jl_par par, before;
@@ -225,23 +226,23 @@ static void test_par_init_refuses_what_does_not_fit(void **state)
     config.to = config.from = chans;
     jl_par_deal(owner, 4, 2);
     assert_int_equal(jl_par_init(&par, &bank.imm, &config, buf, sizeof buf,
-                                 mode_status), JL_ETOOLONG);
+                                 mode_status, z), JL_ETOOLONG);
     small.max_len = 1 << 20;
     assert_int_equal(jl_par_init(&par, &bank.imm, &config, buf, 100,
-                                 mode_status), JL_ENOMEM);
+                                 mode_status, z), JL_ENOMEM);
     config.pe = 2;
     assert_int_equal(jl_par_init(&par, &bank.imm, &config, buf, sizeof buf,
-                                 mode_status), JL_EDIM);
+                                 mode_status, z), JL_EDIM);
     config.pe = 0;
     owner[3] = 2;                       /* a PE that is not there */
     assert_int_equal(jl_par_init(&par, &bank.imm, &config, buf, sizeof buf,
-                                 mode_status), JL_EDIM);
+                                 mode_status, z), JL_EDIM);
     memset(owner, 1, sizeof owner);     /* PE0 owns nothing */
     assert_int_equal(jl_par_init(&par, &bank.imm, &config, buf, sizeof buf,
-                                 mode_status), JL_EDIM);
+                                 mode_status, z), JL_EDIM);
     config.npe = JL_MAX_PES + 1;
     assert_int_equal(jl_par_init(&par, &bank.imm, &config, buf, sizeof buf,
-                                 mode_status), JL_EDIM);
+                                 mode_status, z), JL_EDIM);
     assert_same_bits(&par, &before, sizeof par);
 }
 
