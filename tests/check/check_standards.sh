@@ -51,7 +51,7 @@ alone() {
 } >"$build/commands"
 
 xargs -d '\n' -n 1 -P "$(nproc)" sh -c \
-    'out=$(eval "$0" 2>&1) || printf "%s\n%s\n" "$0" "$out"' \
+    'out=$(eval "$0" 2>&1) || { echo "$0" | sed "s/ -[WfD][^ ]*//g"; echo "$out"; }' \
     <"$build/commands" >"$build/errors"
 cat "$build/errors"
 
