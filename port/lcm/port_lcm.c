@@ -16,7 +16,6 @@
 
 #define RTO_US 20000
 #define ACK_US 5000
-#define SPIN_US 20
 #define QUIET_US (3 * RTO_US)
 #define HANDLE_MAX 64           /* messages between two looks at the clock  */
 #define RUN_MAX 16
@@ -48,7 +47,6 @@ struct jl_lcm {
     struct pollfd readable;
     int node, nodes;
     struct peer *peers;         /* [nodes]; our own is not used             */
-    long spin_us;
     double drop;
     jl_u32 noise;               /* state of the generator for drop          */
     unsigned long strays;       /* messages that belong to no link          */
@@ -155,10 +153,12 @@ static int take_in(jl_lcm *l)
 
 /* Keep all links going, and if nothing has come in, block until something
  * does, a link's timer, or the deadline.
+ * There is no spinning: it takes the core from LCM's reader thread, and made a
+ * round trip of 64 octets 85 us instead of 55 (2 nodes, 2 cores).
  * Returns JL_OK: look again; JL_ETIMEOUT: look a last time; JL_EIO. */
 static int turn(jl_lcm *l, long long deadline)
 {
-    long long now, spin_end;
+    long long now;
     int n;
 
     flush(l);
@@ -169,11 +169,7 @@ static int turn(jl_lcm *l, long long deadline)
 
         if (deadline != NEVER && (us < 0 || deadline - now < us))
             us = (long)(deadline - now);
-        spin_end = now + (us < 0 || us > l->spin_us ? l->spin_us : us);
-        while (clock_us() < spin_end && n == 0)
-            n = await_message(l, 0);
-        if (n == 0)
-            await_message(l, us);
+        await_message(l, us);
         n = take_in(l);
     }
     if (n < 0)
@@ -389,8 +385,6 @@ static const char *join(jl_lcm *l, const jl_lcm_config *c)
     l->noise = (c->seed * 2654435761U) ^ ((unsigned)c->node + 1) * 40503U;
     if (l->noise == 0)
         l->noise = 1;
-    /* Spinning takes the core from a peer unless everybody has one. */
-    l->spin_us = c->nodes <= sysconf(_SC_NPROCESSORS_ONLN) ? SPIN_US : 0;
     l->peers = calloc((size_t)c->nodes, sizeof *l->peers);
     if (l->peers == NULL)
         return "no memory";

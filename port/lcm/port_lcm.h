@@ -4,6 +4,10 @@
  * are frames of jl_link, one link a peer, since LCM loses messages.  Messages
  * on the network stay under 1400 octets; the receive buffer is 4 MB and the
  * subscription's queue has no limit of its own.
+ *
+ * A node goes on only while it is in a call: one that computes for longer than
+ * 20 ms between calls is sent some messages again, which costs time only.
+ * LCM has a thread of its own: fork before jl_lcm_open, not after.
  */
 #ifndef PORT_LCM_H
 #define PORT_LCM_H
@@ -24,19 +28,25 @@ typedef struct jl_lcm_config {
     unsigned seed;              /* purpose before LCM sees them: tests      */
 } jl_lcm_config;
 
-/* Join the run.  Returns NULL and points *why to a static text when that fails
- * ("no multicast route", "bad address", ...). */
+/* Join the run; the peers may come later, and messages sent before wait for
+ * them.  config is not kept.  Takes 10 s to fail behind a firewall that drops
+ * multicast, and keeps LCM's own words off stderr.
+ * Returns NULL and points *why to a static text when it fails ("no multicast
+ * route ...", "bad LCM address ...", ...); else *why is NULL. */
 jl_lcm *jl_lcm_open(const jl_lcm_config *config, const char **why);
 
-/* Close: wait up to linger_us until all that was sent is acknowledged and the
- * peers' last words are answered, then leave. */
+/* Close: wait up to linger_us until all that was sent is acknowledged, or its
+ * receiver has closed too; then stay 60 ms to answer peers that did not hear
+ * our last word, unless all have closed and nothing was ever lost. */
 void jl_lcm_close(jl_lcm *lcm, long linger_us);
 
-/* Channels to and from another node; valid until jl_lcm_close. */
+/* Channels to and from another node; valid until jl_lcm_close.  NULL if there
+ * is no such node, or it is this one. */
 jl_chan *jl_lcm_tx(jl_lcm *lcm, int node);
 jl_chan *jl_lcm_rx(jl_lcm *lcm, int node);
 
-/* Sum of the counters of all links. */
+/* Sum of the counters of all links; `refused` also counts what came from no
+ * node of this run. */
 jl_link_count jl_lcm_count(const jl_lcm *lcm);
 
 #endif

@@ -161,6 +161,7 @@ static void test_conform_lcm(void **state)
     (void)state;
     need_net();
     drop = 0;
+    lcm_port.max_len = 3000;
     lcm_port.step = 1;
     lcm_port.rounds = 20;
     all_cases();
@@ -171,8 +172,9 @@ static void test_conform_lcm_lossy(void **state)
     (void)state;
     need_net();
     drop = 0.3;
-    lcm_port.step = 101;
-    lcm_port.rounds = 2;
+    lcm_port.max_len = 2000;
+    lcm_port.step = 333;
+    lcm_port.rounds = 1;
     all_cases();
     drop = 0;
 }
@@ -219,6 +221,9 @@ static void among_strangers(int pe)
     snprintf(channel, sizeof channel, "JL.%s.%d", run_name, 1 - pe);
     other = lcm_create(URL);
     EXPECT(other != NULL, ==, 1);
+    /* not before the other one listens */
+    EXPECT(jl_chan_send(tx(pe, 1 - pe), NULL, 0, LONG_US), ==, JL_OK);
+    EXPECT(jl_chan_recv(rx(1 - pe, pe), NULL, 0, LONG_US), ==, 0);
     for (i = 0; i < 200; i++) {
         unsigned len = conform_random(&state) % sizeof noise;
 
