@@ -92,9 +92,10 @@ int jl_link_recv(jl_link *link, unsigned char *msg, int cap)
         int n = JLI_PIECE_LEN(piece);
 
         kind = JLI_PIECE_KIND(piece);
-        if (n > 0)
+        if (n > 0) {
             memcpy(msg, JLI_PIECE_PAYLOAD(piece), (size_t)n);
-        msg += n;
+            msg += n;
+        }
         link->in_slot = (link->in_slot + 1) % link->window;
         link->in_held--;
     } while (kind != JL_FRAME_LAST);

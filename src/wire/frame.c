@@ -72,10 +72,12 @@ static int zeros(const unsigned char *p, int n)
 int jl_frame_decode(jl_frame *frame, const unsigned char *buf, int len,
                     int number)
 {
-    int end = len - JL_FRAME_TRAILER, payload = end - JL_FRAME_HEADER;
+    int end, payload;
 
     if (len < JL_FRAME_HEADER + JL_FRAME_TRAILER || len > JL_FRAME_MAX)
         return JL_ELENGTH;
+    end = len - JL_FRAME_TRAILER;
+    payload = end - JL_FRAME_HEADER;
     if (buf[AT_MAGIC] != 0x4A || buf[AT_MAGIC + 1] != 0x4C)
         return JL_EMAGIC;
     if (buf[AT_VERSION] != JL_FRAME_VERSION)
