@@ -54,6 +54,8 @@ int bank_open(struct bank *bank, const struct model *model,
     memset(bank, 0, sizeof *bank);
     bank->model = model;
     bank->dt = -1;
+    if (model->M < 1)
+        return -1;
     if (copy_modes(bank) != 0 || open_imm(bank, form) != 0) {
         bank_close(bank);
         return -1;

@@ -14,7 +14,8 @@ struct estimates {
     jl_real *P;                 /* [rows,n,n]                               */
     jl_real *mu;                /* [rows,M]                                 */
     jl_real *loglik;            /* [rows]                                   */
-    double *us;                 /* [rows] wall clock of the step; NaN       */
+    double *us;                 /* [rows] wall clock of the step; NaN in a
+                                   row without one (the start is none)      */
 };
 
 /* Returns 0, or -1 after a message if there is no memory. */

@@ -8,6 +8,8 @@
 #include "out_file.h"
 #include "plot.h"
 
+#define WAYS 2                  /* with held positions, of a model at most */
+
 /* --- names --------------------------------------------------------------- */
 
 int flight_fits(const struct model *model)
@@ -54,7 +56,8 @@ void flight_run_name(struct flight_run *run, const struct model *model,
 
 /* --- errors -------------------------------------------------------------- */
 
-/* |v - truth| in a row; NaN where either is missing. */
+/* |v - truth| in a row; NaN where either is missing, and in the row that the
+ * filter starts from: its velocity is the start's 0 and no estimate. */
 static double velocity_error(const struct flight_run *run,
                              const struct data_file *data, long row)
 {
@@ -62,6 +65,8 @@ static double velocity_error(const struct flight_run *run,
     const jl_real *x = run->e.x + row * n;
     const double *truth = data->extra + row * data->n_extra;
 
+    if (isnan(run->e.us[row]))
+        return NAN;
     return hypot((double)x[1] - truth[0], (double)x[order + 1] - truth[1]);
 }
 
@@ -194,39 +199,39 @@ static int write_tables(const struct flight_report *r, const char *folder)
 
 /* --- plots --------------------------------------------------------------- */
 
-static int plot_tracks(const struct flight_report *r, const char *folder)
+/* The runs of one model, from `first`, in one picture. */
+static int plot_model(const struct flight_report *r, int first, int count,
+                      const char *folder)
 {
-    struct plot_series series[1 + 2 * 8];
-    char file[16][128], north[16];
+    const struct flight_run *runs = r->runs + first;
+    const char *time = r->data->time_name;
+    struct plot_series track[1 + WAYS], error[1 + WAYS];
+    char file[WAYS][128], north[16], name[128], title[128];
     int i, status;
 
-    snprintf(north, sizeof north, "x%d", r->runs[0].source->motions[0].order);
-    series[0] = (struct plot_series){ "track.csv", "east_m", "north_m",
-                                      "measured", PLOT_DOTS };
-    for (i = 0; i < r->count; i++) {
-        snprintf(file[i], sizeof file[i], "%s.csv", r->runs[i].name);
-        series[1 + i] = (struct plot_series){ file[i], "x0", north,
-                                              r->runs[i].name, PLOT_LINE };
+    snprintf(north, sizeof north, "x%d", runs->source->motions[0].order);
+    track[0] = (struct plot_series){ "track.csv", "east_m", "north_m",
+                                     "measured", PLOT_DOTS };
+    error[0] = (struct plot_series){ "track.csv", time, "held",
+                                     "position held", PLOT_SHADE };
+    for (i = 0; i < count; i++) {
+        snprintf(file[i], sizeof file[i], "%s.csv", runs[i].name);
+        track[1 + i] = (struct plot_series){ file[i], "x0", north,
+                                             runs[i].positions, PLOT_LINE };
+        error[1 + i] = (struct plot_series){ "track.csv", time, runs[i].name,
+                                             runs[i].positions, PLOT_LINE };
     }
-    status = plot_track(folder, "track", "Track: measured and estimated",
-                        series, 1 + r->count);
-    return status;
-}
-
-static int plot_velocity_errors(const struct flight_report *r,
-                                const char *folder)
-{
-    struct plot_series series[1 + 2 * 8];
-    int i;
-
-    series[0] = (struct plot_series){ "track.csv", r->data->time_name, "held",
-                                      "position held", PLOT_SHADE };
-    for (i = 0; i < r->count; i++)
-        series[1 + i] = (struct plot_series){ "track.csv", r->data->time_name,
-                                              r->runs[i].name,
-                                              r->runs[i].name, PLOT_LINE };
-    return plot_errors(folder, "velocity_error", "Velocity error",
-                       "velocity error in m/s", series, 1 + r->count);
+    snprintf(name, sizeof name, "track_%s", runs->model);
+    snprintf(title, sizeof title, "Track: %s, held positions taken as",
+             runs->model);
+    status = plot_track(folder, name, title, track, 1 + count);
+    if (status != 0)
+        return status;
+    snprintf(name, sizeof name, "velocity_error_%s", runs->model);
+    snprintf(title, sizeof title, "Velocity error: %s, held positions taken "
+             "as", runs->model);
+    return plot_errors(folder, name, title, "velocity error in m/s", error,
+                       1 + count);
 }
 
 static int plot_run_modes(const struct flight_report *r,
@@ -262,18 +267,20 @@ static int plot_run_modes(const struct flight_report *r,
 
 int flight_report_write(const struct flight_report *r, const char *folder)
 {
-    int i, bad = 0;
+    int i, same, bad = 0;
 
     for (i = 0; i < r->count; i++)
         bad |= write_estimates(r, &r->runs[i], folder) != 0;
     bad |= write_track(r, folder) != 0;
     bad |= write_tables(r, folder) != 0;
-    if (!bad) {
-        bad |= plot_tracks(r, folder) != 0;
-        bad |= plot_velocity_errors(r, folder) != 0;
-        for (i = 0; i < r->count; i++)
-            bad |= plot_run_modes(r, &r->runs[i], folder) != 0;
+    for (i = 0; !bad && i < r->count; i += same) {
+        for (same = 1; i + same < r->count
+             && r->runs[i + same].source == r->runs[i].source; same++)
+            ;
+        bad |= plot_model(r, i, same, folder) != 0;
     }
+    for (i = 0; !bad && i < r->count; i++)
+        bad |= plot_run_modes(r, &r->runs[i], folder) != 0;
     print_table(r, stdout);
     printf("%s %s\n", bad ? "incomplete:" : "tables, CSV and plots:", folder);
     for (i = 0; i < r->count; i++)

@@ -107,11 +107,11 @@ int run_serial(struct estimates *e, const struct model *model,
         status = bank_prepare(&bank, imm, &meas);
         if (status == JL_OK)
             status = jl_imm_step(imm, meas.z, bank.scratch);
+        if (status == JL_OK || status == JL_STARTED)
+            note(e, row, imm->xhat, imm->Phat, imm->mu, imm->loglik,
+                 status == JL_OK ? clock_us() - before : (double)NAN);
         if (status == JL_STARTED)
             status = JL_OK;
-        if (status == JL_OK)
-            note(e, row, imm->xhat, imm->Phat, imm->mu, imm->loglik,
-                 clock_us() - before);
         progress(row + 1, data->rows);
     }
     bank_close(&bank);
@@ -205,7 +205,7 @@ static int host_row(struct estimates *e, long row,
         status = estimate->status;
     if (status == JL_OK)
         note(e, row, estimate->x, estimate->P, estimate->mu, estimate->loglik,
-             clock_us() - before);
+             meas->first && model->x0 == NULL ? (double)NAN : clock_us() - before);
     return status;
 }
 
