@@ -25,8 +25,8 @@ struct tolerance {
     double x, P, mu, loglik;
 };
 
-#if JL_REAL_FLOAT
-static const struct tolerance ordinary = { 2e-2, 2e-3, 2e-3, 1e-3 };
+#if JL_REAL_FLOAT       /* about seven times what was measured */
+static const struct tolerance ordinary = { 5e-3, 1e-3, 5e-4, 5e-4 };
 #else
 static const struct tolerance ordinary = { 1e-10, 1e-11, 1e-11, 1e-11 };
 static const struct tolerance hard_joseph = { 5e-3, 2e-4, 5e-6, 5e-7 };
