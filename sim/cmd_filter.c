@@ -7,14 +7,15 @@
 
 static const char help[] =
     "usage: jumplink filter MODEL.json DATA.csv [OPTIONS]\n"
-    "Runs a filter over the measurements in a file and writes its estimates as\n"
-    "CSV: time, x0.., P00,P01.. (upper triangle), mu0.., loglik.\n\n"
-    "  -o, --out FILE         where to (default: standard output)\n"
+    "Runs a filter over the measurements in a file and writes its\n"
+    "estimates as CSV: time, x0.., P00,P01.. (upper triangle), mu0..,\n"
+    "loglik.\n\n"
+    "  -o, --out FILE    where to (default: standard output)\n"
     COMMON_HELP
     DATA_HELP
-    "  --port loop|lcm        run on several PEs: threads that take turns, or\n"
-    "                         processes that talk over LCM\n"
-    "  --pes P                ... this many (default 4)\n"
+    "  --port loop|lcm   run on several PEs: threads that take turns, or\n"
+    "                    processes that talk over LCM\n"
+    "  --pes P           ... this many (default 4)\n"
     PORT_HELP;
 
 int cmd_filter(int argc, char **argv)

@@ -6,15 +6,14 @@
 #include "run_file.h"
 
 static const char help[] =
-    "usage: jumplink host MODEL.json DATA.csv --pes P --lcm-url URL [OPTIONS]\n"
-    "The host of a run on several machines: waits for the PEs (jumplink pe), feeds\n"
-    "them the measurements, and writes the estimates like jumplink filter.\n\n"
-    "  -o, --out FILE         where to (default: standard output)\n"
-    "  --pes P                how many PEs there are\n"
-    "  --run NAME             name of the run, if several share a network\n"
-    "                         (default jumplink)\n"
-    "  --timeout S            longest wait for an answer (default 2)\n"
-    "  --lcm-url URL          LCM address, such as udpm://239.255.76.67:7667?ttl=1\n"
+    "usage: jumplink host MODEL.json DATA.csv --pes P --lcm-url URL\n"
+    "The host of a run on several machines: waits for the PEs (jumplink\n"
+    "pe), feeds them the measurements, and writes the estimates like\n"
+    "jumplink filter.\n\n"
+    "  -o, --out FILE    where to (default: standard output)\n"
+    "  --pes P           how many PEs there are\n"
+    "  --timeout S       longest wait for an answer (default 2)\n"
+    RUN_HELP
     COMMON_HELP
     DATA_HELP;
 

@@ -9,16 +9,15 @@
 
 static const char help[] =
     "usage: jumplink pe --pe I --pes P --model MODEL.json --lcm-url URL\n"
-    "One PE of a run on several machines: the same model, filter and form on all\n"
-    "PEs and on the host (jumplink host), which must be started too, in any order.\n"
-    "Ends when the host ends; prints what it sent.\n\n"
-    "  --pe I                 which PE this is, from 0; PE 0 talks to the host\n"
-    "  --pes P                how many there are\n"
-    "  --model MODEL.json     the model\n"
-    "  --run NAME             name of the run, if several share a network\n"
-    "                         (default jumplink)\n"
-    "  --timeout S            longest wait for another PE in a step (default 2)\n"
-    "  --lcm-url URL          LCM address, such as udpm://239.255.76.67:7667?ttl=1\n"
+    "One PE of a run on several machines: the same model, filter and\n"
+    "form on all PEs and on the host (jumplink host), which must be\n"
+    "started too, in any order.  Ends when the host ends; prints what it\n"
+    "sent.\n\n"
+    "  --pe I            which PE this is, from 0; PE 0 talks to the host\n"
+    "  --pes P           how many there are\n"
+    "  --model MODEL.json  the model\n"
+    "  --timeout S       longest wait for another PE in a step (default 2)\n"
+    RUN_HELP
     COMMON_HELP;
 
 static int serve(int pe, const struct model *model,

@@ -17,20 +17,24 @@
 
 static const char help[] =
     "usage: jumplink sim [OPTIONS]\n"
-    "Filters a recorded flight on PEs that are processes talking over LCM, once with\n"
-    "every position taken as fresh and once with held positions recognised, for\n"
-    "each model; compares with the serial filter; writes a table, CSV and plots.\n\n"
-    "  --data FILE            the record (default sim/data/carrier_held_1hz.csv),\n"
-    "                         with true velocities v_east_mps, v_north_mps\n"
-    "  --model FILE           a model; may be given several times (default\n"
-    "                         sim/data/two_modes.json, sim/data/eight_modes.json)\n"
-    "  -o, --out DIR          where results go (default build/sim)\n"
-    "  --pes P                PEs (default 4)\n"
-    "  --port lcm|loop        processes over LCM, or threads that take turns\n"
+    "Filters a recorded flight on PEs that are processes talking over\n"
+    "LCM, once with every position taken as fresh and once with held\n"
+    "positions recognised, for each model; compares with the serial\n"
+    "filter; writes a table, CSV and plots.\n\n"
+    "  --data FILE       the record, with true velocities v_east_mps and\n"
+    "                    v_north_mps (default\n"
+    "                    sim/data/carrier_held_1hz.csv)\n"
+    "  --model FILE      a model; may be given several times (default\n"
+    "                    sim/data/two_modes.json and eight_modes.json)\n"
+    "  -o, --out DIR     where results go (default build/sim)\n"
+    "  --port lcm|loop   processes over LCM (default), or threads that\n"
+    "                    take turns\n"
+    "  --pes P           PEs (default 4)\n"
     COMMON_HELP
     "  --hold none|detect|column  only this way with held positions\n"
-    "  --z A,B                columns of the position (default east_m,north_m)\n"
-    "  --time NAME            column of the time (default t_s, else k)\n"
+    "  --z A,B           columns of the position (default\n"
+    "                    east_m,north_m)\n"
+    "  --time NAME       column of the time (default t_s, else k)\n"
     PORT_HELP;
 
 /* mkdir -p */

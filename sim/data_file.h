@@ -8,9 +8,9 @@
 
 /* Which columns to take; NULL or 0 for the defaults. */
 struct data_columns {
-    const char *z;              /* "east_m,north_m"; default z0,z1,.. or z1,.. */
+    const char *z;              /* "east_m,north_m"; default z0.. or z1..   */
     const char *time;           /* "t_s"; default t_s if there, else k      */
-    const char *extra;          /* more numbers to keep, e.g. a truth, or NULL */
+    const char *extra;          /* more to keep, e.g. a truth; or NULL      */
 };
 
 struct data_file {

@@ -28,9 +28,7 @@ static void help(FILE *out)
             "elements joined by links.\n\n");
     for (i = 0; i < COMMANDS; i++)
         fprintf(out, "  %-8s %s\n", commands[i].name, commands[i].does);
-    fprintf(out, "\n  jumplink COMMAND --help says more; --version: %d.%d, %s\n",
-            JL_VERSION_MAJOR, JL_VERSION_MINOR,
-            JL_REAL_FLOAT ? "float" : "double");
+    fprintf(out, "\njumplink COMMAND --help says more; jumplink --version.\n");
 }
 
 int main(int argc, char **argv)

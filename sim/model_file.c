@@ -93,7 +93,8 @@ static int check_distribution(const jl_real *p, const struct json_at *at,
         sum += p[i];
     }
     if (sum - 1 > JL_PROB_TOLERANCE || 1 - sum > JL_PROB_TOLERANCE)
-        return json_wrong(at, key, "sums to %.12g, not to 1", (double)sum);
+        return json_wrong(at, key, "sums to 1%+.3g, not to 1",
+                          (double)(sum - 1));
     return 0;
 }
 

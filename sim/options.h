@@ -49,20 +49,27 @@ struct options {
     { "help", no_argument, NULL, 'h' }
 
 #define COMMON_HELP \
-    "  --filter imm|kf        the filter (default imm); kf is the Kalman filter of\n" \
-    "  --mode J               this one mode, from 0 (default: the only one)\n" \
-    "  --form joseph|standard how covariances are updated (default joseph)\n"
+    "  --filter imm|kf   the filter (default imm); kf is the Kalman\n" \
+    "  --mode J          filter of this one mode, from 0 (default: the\n" \
+    "                    only one)\n" \
+    "  --form joseph|standard  how covariances are updated (default\n" \
+    "                    joseph)\n"
 #define DATA_HELP \
-    "  --hold none|detect|column  which measurements count as lost: none; those\n" \
-    "                         that repeat the row before exactly; those with 0 in\n" \
-    "                         column arrived (default: column if there is one, else\n" \
-    "                         none)\n" \
-    "  --z A,B,..             columns of the measurement (default z0,z1,..)\n" \
-    "  --time NAME            column of the time (default t_s, else k)\n"
+    "  --hold HOW        which measurements count as lost: none; detect:\n" \
+    "                    those that repeat the row before exactly; column:\n" \
+    "                    those with 0 in column arrived (default: column\n" \
+    "                    if there is one, else none)\n" \
+    "  --z A,B,..        columns of the measurement (default z0,z1,..)\n" \
+    "  --time NAME       column of the time (default t_s, else k)\n"
 #define PORT_HELP \
-    "  --timeout S            longest wait for an answer (default 2)\n" \
-    "  --lcm-url URL          LCM address, on the network as it is (default: a\n" \
-    "                         private network for this run)\n"
+    "  --timeout S       longest wait for an answer (default 2)\n" \
+    "  --lcm-url URL     LCM address, on the network as it is (default: a\n" \
+    "                    private network for this run)\n"
+#define RUN_HELP \
+    "  --run NAME        name of the run, if several share a network\n" \
+    "                    (default jumplink)\n" \
+    "  --lcm-url URL     LCM address, such as\n" \
+    "                    udpm://239.255.76.67:7667?ttl=1\n"
 
 void options_init(struct options *options, const char *command);
 
