@@ -13,9 +13,10 @@ static const char help[] =
     "  -o, --out FILE    where to (default: standard output)\n"
     COMMON_HELP
     DATA_HELP
-    "  --port loop|lcm   run on several PEs: threads that take turns, or\n"
-    "                    processes that talk over LCM\n"
-    "  --pes P           ... this many (default 4)\n"
+    "  --pes P           run on this many PEs (default 4 with --port, else\n"
+    "                    serial)\n"
+    "  --port lcm|loop   ... that are processes and talk over LCM (default\n"
+    "                    with --pes), or threads that take turns\n"
     PORT_HELP;
 
 int cmd_filter(int argc, char **argv)
@@ -39,7 +40,7 @@ int cmd_filter(int argc, char **argv)
     if (options.run != NULL)
         return misuse("filter", "--run goes with jumplink pe and host");
     if (options.port == PORT_NONE && options.pes > 0)
-        return misuse("filter", "--pes needs --port");
+        options.port = PORT_LCM;
     if (options.port != PORT_LCM && options.lcm_url != NULL)
         return misuse("filter", "--lcm-url needs --port lcm");
     if (options.pes == 0)

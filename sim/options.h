@@ -49,9 +49,8 @@ struct options {
     { "help", no_argument, NULL, 'h' }
 
 #define COMMON_HELP \
-    "  --filter imm|kf   the filter (default imm); kf is the Kalman\n" \
-    "  --mode J          filter of this one mode, from 0 (default: the\n" \
-    "                    only one)\n" \
+    "  --filter imm|kf   all modes (default), or the Kalman filter of one\n" \
+    "  --mode J          ... of this one, from 0 (default: the only one)\n" \
     "  --form joseph|standard  how covariances are updated (default\n" \
     "                    joseph)\n"
 #define DATA_HELP \

@@ -195,6 +195,7 @@ static int host_row(struct estimates *e, long row,
                     unsigned char *buf, int cap, long timeout_us)
 {
     double before = clock_us();
+    int is_start = meas->first && model->x0 == NULL;
     int status = jl_host_send(host->to, meas, model->m, buf, cap, timeout_us);
 
     if (status == JL_OK)
@@ -205,7 +206,7 @@ static int host_row(struct estimates *e, long row,
         status = estimate->status;
     if (status == JL_OK)
         note(e, row, estimate->x, estimate->P, estimate->mu, estimate->loglik,
-             meas->first && model->x0 == NULL ? (double)NAN : clock_us() - before);
+             is_start ? (double)NAN : clock_us() - before);
     return status;
 }
 

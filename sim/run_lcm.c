@@ -159,7 +159,7 @@ static int add_words(struct traffic *traffic, FILE *words)
 }
 
 /* Wait for all PEs; those that do not leave in time are ended.  Returns 0 if
- * all left of their own and reported, else 1 (after a message if `complains`). */
+ * all left of their own and reported; else 1, after a message if `complains`. */
 static int dismiss(struct crew *crew, struct traffic *traffic, int complains)
 {
     double deadline = clock_us() + (complains ? LEAVE_US : 0);

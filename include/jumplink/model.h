@@ -89,7 +89,7 @@ typedef struct jl_motion {
 int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt);
 
 /* The state after a first measurement z [axes]: x [n] at z with velocity 0 and
- * acceleration 0; P [n,n] diagonal with variances sigma_z^2, v0_std^2, a0_std^2.
+ * acceleration 0; P [n,n] diagonal: sigma_z^2, v0_std^2, a0_std^2 an axis.
  * Returns JL_OK, JL_EDIM, JL_ENONFINITE, JL_ERANGE (a deviation <= 0). */
 int jl_motion_start(jl_real *x, jl_real *P, const jl_motion *motion,
                     const jl_real *z, jl_real v0_std, jl_real a0_std);
