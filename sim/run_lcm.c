@@ -159,10 +159,10 @@ static int add_words(struct traffic *traffic, FILE *words)
 }
 
 /* Wait for all PEs; those that do not leave in time are ended.  Returns 0 if
- * all left of their own and reported; else 1, after a message if `complains`. */
-static int dismiss(struct crew *crew, struct traffic *traffic, int complains)
+ * all left of their own and reported, else 1 (after a message, if wanted). */
+static int dismiss(struct crew *crew, struct traffic *traffic, int wanted)
 {
-    double deadline = clock_us() + (complains ? LEAVE_US : 0);
+    double deadline = clock_us() + (wanted ? LEAVE_US : 0);
     int pe, status = 0;
 
     for (pe = 0; pe < crew->pes; pe++) {
@@ -177,7 +177,7 @@ static int dismiss(struct crew *crew, struct traffic *traffic, int complains)
         }
         if (p->words != NULL) {
             if ((!add_words(traffic, p->words) || p->status != 0)
-                && complains) {
+                && wanted) {
                 tell(pe, p);
                 status = 1;
             }
