@@ -27,7 +27,8 @@ CORE := -std=c89 -pedantic $(WARN) -Wdeclaration-after-statement $(EXACT) \
 HOST := -std=c11 -D_GNU_SOURCE -pthread $(WARN) $(EXACT) -Iinclude -Iport -Isim
 FLOAT := -DJL_REAL_FLOAT=1
 
-have = $(shell printf '\#include <$(1)>\n' | $(CC) -E -xc - >/dev/null 2>&1 && echo yes)
+INCLUDE := \#include
+have = $(shell echo '$(INCLUDE) <$(1)>' | $(CC) -E - >/dev/null 2>&1 && echo yes)
 HAVE_LCM := $(call have,lcm/lcm.h)
 HAVE_JANSSON := $(call have,jansson.h)
 PROGRAMS := $(if $(and $(HAVE_LCM),$(HAVE_JANSSON),$(wildcard sim/main.c)),$(BUILD)/jumplink $(BUILD)/jumplink_f32)
