@@ -37,7 +37,7 @@ int estimates_open(struct estimates *e, const struct data_file *data,
         return complain(data->path, 0, NULL, "no memory for its estimates");
     }
     for (i = 0; i < e->rows; i++)
-        e->us[i] = NAN;
+        e->us[i] = (double)NAN;
     return 0;
 }
 
@@ -80,7 +80,7 @@ long estimates_times(const struct estimates *e, double *median_us,
     double *sorted = malloc((size_t)e->rows * sizeof *sorted);
     long i, count = 0;
 
-    *median_us = *p99_us = NAN;
+    *median_us = *p99_us = (double)NAN;
     for (i = 0; sorted != NULL && i < e->rows; i++)
         if (!isnan(e->us[i]))
             sorted[count++] = e->us[i];
@@ -95,7 +95,7 @@ long estimates_times(const struct estimates *e, double *median_us,
 
 static void put(FILE *out, jl_real v)
 {
-    if (isnan(v))
+    if (isnan((double)v))
         fputs(",nan", out);
     else
         fprintf(out, ",%.17g", (double)v);

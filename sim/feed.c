@@ -41,7 +41,7 @@ int feed_arrived(const struct feed *feed, long row)
     int i, repeats = !begins(data, row);
 
     for (i = 0; i < data->m; i++) {
-        if (isnan(z[i]))
+        if (isnan((double)z[i]))
             return 0;
         if (repeats && !(z[i] >= z[i - data->m] && z[i] <= z[i - data->m]))
             repeats = 0;

@@ -66,7 +66,7 @@ static double velocity_error(const struct flight_run *run,
     const double *truth = data->extra + row * data->n_extra;
 
     if (isnan(run->e.us[row]))
-        return NAN;
+        return (double)NAN;
     return hypot((double)x[1] - truth[0], (double)x[order + 1] - truth[1]);
 }
 
