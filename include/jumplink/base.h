@@ -91,8 +91,9 @@ const char *jl_status_text(int status);
 /* --- elementary functions ---------------------------------------------- */
 
 /* C libraries differ in the last bit; these are plain arithmetic, the same
- * bits wherever jl_real is an IEEE number and the compiler neither contracts
- * nor reorders (-ffp-contract=off, no -ffast-math). */
+ * bits wherever jl_real is an IEEE number with gradual underflow and the
+ * compiler neither contracts nor reorders (-ffp-contract=off, no -ffast-math)
+ * nor keeps excess precision (32-bit x86: -msse2 -mfpmath=sse). */
 
 /* e^x, at most 1 ulp off.  Gradual underflow to 0; overflow to infinity;
  * NaN for NaN. */
