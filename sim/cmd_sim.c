@@ -63,6 +63,7 @@ static int one_run(struct flight_run *r, const struct model *model,
 {
     struct estimates serial;
     char what[200];
+    double p99;
     int status;
 
     if (estimates_open(&serial, data, model) != 0)
@@ -80,6 +81,7 @@ static int one_run(struct flight_run *r, const struct model *model,
         progress_begin(NULL);
     }
     r->same = status == 0 && estimates_same(&serial, &r->e);
+    (void)estimates_times(&serial, &r->serial_us, &p99);
     estimates_close(&serial);
     return status;
 }

@@ -138,6 +138,8 @@ static int write_track(const struct flight_report *r, const char *folder)
 
 /* --- table --------------------------------------------------------------- */
 
+#define HEAD "%-12s %-10s %8s %6s %8s %8s %7s %8s %6s %s\n"
+
 static void print_table(const struct flight_report *r, FILE *out)
 {
     int i;
@@ -147,21 +149,19 @@ static void print_table(const struct flight_report *r, FILE *out)
             r->options->port == PORT_LCM ? "LCM" : "loop",
             r->options->form == &jl_kf_joseph ? "Joseph" : "standard",
             JL_REAL_FLOAT ? "float" : "double");
-    fprintf(out, "%-16s %-11s %12s %6s %10s %10s %9s %7s  %s\n", "model",
-            "positions", "velocity err", "steps", "step p50", "step p99",
-            "messages", "resent", "same bits as");
-    fprintf(out, "%-16s %-11s %12s %6s %10s %10s %9s %7s  %s\n", "",
-            "held are", "rms, m/s", "", "us", "us", "", "",
-            "the serial filter");
+    fprintf(out, HEAD, "", "held", "velocity", "", "step, us", "", "serial",
+            "messages", "", "same bits");
+    fprintf(out, HEAD, "model", "positions", "rms, m/s", "steps", "median",
+            "p99", "median", "sent", "resent", "as serial");
     for (i = 0; i < r->count; i++) {
         const struct flight_run *run = &r->runs[i];
         double median, p99;
         long steps = estimates_times(&run->e, &median, &p99);
 
-        fprintf(out, "%-16s %-11s %12.2f %6ld %10.1f %10.1f %9lu %7lu  %s\n",
+        fprintf(out, "%-12s %-10s %8.2f %6ld %8.1f %8.1f %7.1f %8lu %6lu %s\n",
                 run->model, run->positions, rms_error(run, r->data), steps,
-                median, p99, run->traffic.messages, run->traffic.resent,
-                run->same ? "yes" : "NO");
+                median, p99, run->serial_us, run->traffic.messages,
+                run->traffic.resent, run->same ? "yes" : "NO");
     }
 }
 
@@ -170,15 +170,15 @@ static void print_csv(const struct flight_report *r, FILE *out)
     int i;
 
     fputs("model,positions,velocity_rms_mps,steps,step_median_us,step_p99_us,"
-          "messages,octets,resent,same_bits\n", out);
+          "serial_median_us,messages,octets,resent,same_bits\n", out);
     for (i = 0; i < r->count; i++) {
         const struct flight_run *run = &r->runs[i];
         double median, p99;
         long steps = estimates_times(&run->e, &median, &p99);
 
-        fprintf(out, "%s,%s,%.6g,%ld,%.6g,%.6g,%lu,%lu,%lu,%d\n", run->model,
-                run->positions, rms_error(run, r->data), steps, median, p99,
-                run->traffic.messages, run->traffic.octets,
+        fprintf(out, "%s,%s,%.6g,%ld,%.6g,%.6g,%.6g,%lu,%lu,%lu,%d\n",
+                run->model, run->positions, rms_error(run, r->data), steps,
+                median, p99, run->serial_us, run->traffic.messages, run->traffic.octets,
                 run->traffic.resent, run->same);
     }
 }

@@ -15,6 +15,7 @@ struct flight_run {
     struct estimates e;
     struct traffic traffic;
     int same;                   /* the serial filter's bits                 */
+    double serial_us;           /* median step of the serial filter         */
 };
 
 struct flight_report {
