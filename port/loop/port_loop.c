@@ -223,7 +223,7 @@ static int meet(struct pe *pe, jl_chan *chan, const unsigned char *msg, int len,
     if (timeout_us == 0 && !receiver_waits(p)) {
         p->loop->now++;
         pass_baton(pe);
-        return closed(p, p->to) ? JL_ECLOSED : JL_ETIMEOUT;
+        return JL_ETIMEOUT;
     }
     put(p, msg, len);
     status = block(pe, SENDS, &chan, 1, timeout_us);

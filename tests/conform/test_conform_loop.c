@@ -72,8 +72,11 @@ static void test_conform_loop_four_slots(void **state)
 
 static void ring_of_recv(int pe)
 {
-    EXPECT(jl_chan_recv(rx((pe + 2) % 3, pe), NULL, 0, JL_FOREVER), ==,
-           JL_EDEADLOCK);
+    jl_chan *from = rx((pe + 2) % 3, pe);
+
+    EXPECT(jl_chan_recv(from, NULL, 0, JL_FOREVER), ==, JL_EDEADLOCK);
+    /* and it can go on from there */
+    EXPECT(jl_chan_recv(from, NULL, 0, 10), !=, JL_EDEADLOCK);
 }
 
 static void ring_of_send(int pe)
@@ -132,9 +135,16 @@ static void one_polls(int pe)
         while (jl_chan_recv(rx(1, 0), NULL, 0, 0) == JL_ETIMEOUT)
             EXPECT(++polls, <, 10000);
         EXPECT(polls, >=, 100);
+        polls = 0;
+        while (jl_chan_send(tx(0, 1), NULL, 0, 0) != JL_ECLOSED)
+            EXPECT(++polls, <, 10000);
+        EXPECT(polls, >=, 100);
+    } else if (pe == 2) {
+        EXPECT(jl_chan_recv(rx(1, 2), NULL, 0, JL_FOREVER), ==, JL_ECLOSED);
     } else {
-        EXPECT(jl_chan_recv(rx(0, 1), NULL, 0, 100), ==, JL_ETIMEOUT);
+        EXPECT(jl_chan_recv(rx(2, 1), NULL, 0, 100), ==, JL_ETIMEOUT);
         EXPECT(jl_chan_send(tx(1, 0), NULL, 0, JL_FOREVER), ==, JL_OK);
+        EXPECT(jl_chan_recv(rx(2, 1), NULL, 0, 100), ==, JL_ETIMEOUT);
     }
 }
 
@@ -158,9 +168,32 @@ static void test_loop_clock(void **state)
     (void)state;
     for (loop_port.slots = 0; loop_port.slots < 2; loop_port.slots++) {
         assert_int_equal(run(2, one_has_a_deadline), 0);
-        assert_int_equal(run(2, one_polls), 0);
+        assert_int_equal(run(3, one_polls), 0);
         assert_int_equal(run(3, sleepers), 0);
     }
+}
+
+/* The other end closes while we are blocked in send: not taken. */
+static void closed_while_sending(int pe)
+{
+    int i;
+
+    if (pe == 1) {
+        EXPECT(jl_chan_recv(rx(2, 1), NULL, 0, 100), ==, JL_ETIMEOUT);
+    } else if (pe == 2) {
+        EXPECT(jl_chan_recv(rx(1, 2), NULL, 0, JL_FOREVER), ==, JL_ECLOSED);
+    } else {
+        for (i = 0; i < loop_port.slots; i++)
+            EXPECT(jl_chan_send(tx(0, 1), NULL, 0, 0), ==, JL_OK);
+        EXPECT(jl_chan_send(tx(0, 1), NULL, 0, JL_FOREVER), ==, JL_ECLOSED);
+    }
+}
+
+static void test_loop_closed_while_sending(void **state)
+{
+    (void)state;
+    for (loop_port.slots = 0; loop_port.slots < 3; loop_port.slots++)
+        assert_int_equal(run(3, closed_while_sending), 0);
 }
 
 /* --- the same on every run ----------------------------------------------- */
@@ -268,6 +301,7 @@ int main(void)
         cmocka_unit_test(test_conform_loop_four_slots),
         cmocka_unit_test(test_loop_deadlock_is_a_result),
         cmocka_unit_test(test_loop_clock),
+        cmocka_unit_test(test_loop_closed_while_sending),
         cmocka_unit_test(test_loop_order_is_the_same),
         cmocka_unit_test(test_loop_run_again),
         cmocka_unit_test(test_loop_bounds),
