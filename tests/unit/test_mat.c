@@ -70,7 +70,9 @@ static void make_cov(jl_real *A, int n, int rank, jl_real c)
     int i, j, k;
 
     for (i = 0; i < n * rank; i++)
-        B[i] = rnd() + (rank < n && i % rank == i / rank ? 2 * (jl_real)rank : 0);
+        B[i] = rnd();
+    for (i = 0; i < rank && rank < n; i++)
+        B[i * rank + i] += 2 * (jl_real)rank;
     for (i = 0; i < n; i++)
         for (j = 0; j < n; j++) {
             A[i * n + j] = i == j ? c : 0;
