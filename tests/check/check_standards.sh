@@ -51,7 +51,7 @@ alone() {
 } >"$build/commands"
 
 xargs -d '\n' -n 1 -P "$(nproc)" sh -c \
-    'out=$(eval "$0" 2>&1) || { echo "$0" | sed "s/ -[WfD][^ ]*//g"; echo "$out"; }' \
+    'out=$(eval "$0" 2>&1) || { echo "$0" | sed "s/ -[WfD][^ ]*//g"; printf "%s\n" "$out" | head -n 12; }' \
     <"$build/commands" >"$build/errors"
 cat "$build/errors"
 

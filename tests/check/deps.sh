@@ -30,7 +30,7 @@ missing() {
         case " $groups " in *" $group "*)
             there "$thing" || echo "$package" ;;
         esac
-    done | sort -u | tr '\n' ' '
+    done | sort -u | tr '\n' ' ' | sed 's/ $//'
 }
 
 groups=$*
