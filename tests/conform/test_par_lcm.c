@@ -1,0 +1,129 @@
+/* The parallel IMM on port lcm, each PE a process: the serial filter's bits for
+ * any number of PEs, and when the network loses datagrams. */
+#include "par_case.h"
+
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "lcm/port_lcm.h"
+#include "private_net.h"
+
+#define URL "udpm://239.255.76.67:7667?ttl=0"
+
+static int is_private;
+
+struct run {
+    int npe, M, sticky;
+    const jl_kf_form *form;
+    double drop;
+};
+
+static jl_lcm *join(const struct run *run, int node, jl_chan **to,
+                    jl_chan **from)
+{
+    jl_lcm_config config = { 0 };
+    const char *why;
+    jl_lcm *lcm;
+    int i;
+
+    config.url = URL;
+    config.run = "par";
+    config.node = node;
+    config.nodes = run->npe + 1;
+    config.number = JL_REAL_OCTETS;
+    config.max_len = JL_PAR_MSG(PAR_M, PAR_N, PAR_Z);
+    config.slots = 2;
+    config.drop = run->drop;
+    config.seed = 1;
+    lcm = jl_lcm_open(&config, &why);
+    for (i = 0; lcm != NULL && i <= run->npe; i++) {
+        to[i] = jl_lcm_tx(lcm, i);
+        from[i] = jl_lcm_rx(lcm, i);
+    }
+    return lcm;
+}
+
+/* The child's life: a PE; its exit status is 0 if all went well. */
+static void be_pe(const struct run *run, int pe, pid_t parent)
+{
+    jl_chan *to[JL_MAX_PES + 1], *from[JL_MAX_PES + 1];
+    int status = JL_EIO;
+    jl_lcm *lcm;
+
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    alarm(30);
+    if (getppid() != parent)
+        _exit(1);
+    lcm = join(run, pe, to, from);
+    if (lcm != NULL)
+        status = par_pe(pe, run->npe, run->M, run->sticky, run->form, to,
+                        from);
+    jl_lcm_close(lcm, 2000000);
+    _exit(status == JL_OK ? 0 : 1);
+}
+
+static void compare(const struct run *run)
+{
+    static struct par_trace serial, trace;
+    jl_chan *to[JL_MAX_PES + 1], *from[JL_MAX_PES + 1];
+    pid_t pid[JL_MAX_PES], parent = getpid();
+    int pe, host = JL_EIO, bad = 0, status;
+    jl_lcm *lcm;
+
+    par_serial(&serial, run->M, run->sticky, run->form);
+    for (pe = 0; pe < run->npe; pe++) {
+        pid[pe] = fork();
+        if (pid[pe] == 0)
+            be_pe(run, pe, parent);
+    }
+    lcm = join(run, run->npe, to, from);
+    if (lcm != NULL)
+        host = par_host(&trace, run->M, to[0], from[0]);
+    jl_lcm_close(lcm, 2000000);
+    for (pe = 0; pe < run->npe; pe++) {
+        if (host != JL_OK)
+            kill(pid[pe], SIGKILL);
+        waitpid(pid[pe], &status, 0);
+        bad += status != 0;
+    }
+    assert_int_equal(host, JL_OK);
+    assert_int_equal(bad, 0);
+    assert_same_bits(&trace, &serial, sizeof serial);
+}
+
+static void test_par_gives_serial_bits_over_lcm(void **state)
+{
+    struct run run = { 0, PAR_M, 0, &jl_kf_joseph, 0 };
+
+    (void)state;
+    if (!is_private)
+        skip();
+    for (run.npe = 1; run.npe <= 8; run.npe++)
+        for (run.sticky = 0; run.sticky < 2; run.sticky++)
+            compare(&run);
+}
+
+static void test_par_gives_serial_bits_over_a_lossy_lcm(void **state)
+{
+    struct run run = { 3, 5, 0, &jl_kf_joseph, 0.3 };
+
+    (void)state;
+    if (!is_private)
+        skip();
+    compare(&run);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_par_gives_serial_bits_over_lcm),
+        cmocka_unit_test(test_par_gives_serial_bits_over_a_lossy_lcm),
+    };
+
+    is_private = private_net_enter() == 0;
+    if (!is_private)
+        print_message("skipped: no private network is allowed here\n");
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
