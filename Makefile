@@ -138,13 +138,13 @@ GOLDEN := $(if $(wildcard tests/golden/gen_golden.c),$(BUILD)/golden/imm_cases.h
 golden: $(GOLDEN)
 $(BUILD)/golden/imm_cases.h: $(BUILD)/gen_golden $(wildcard tests/golden/imm/*/*)
 	@mkdir -p $(@D)
-	$(BUILD)/gen_golden tests/golden/imm >$@
+	@echo '  $@'; $(BUILD)/gen_golden tests/golden/imm >$@
 $(BUILD)/gen_golden: tests/golden/gen_golden.c $(BUILD)/flags
-	$(CC) $(HOST) $(CFLAGS) $< $(LIBS) -o $@
+	@echo '  $@'; $(CC) $(HOST) $(CFLAGS) $< $(LIBS) -o $@
 
 run-tests: $(TESTS) $(PROGRAMS) lib
 	@CC='$(CC)' CFLAGS='$(CFLAGS)' BUILD='$(BUILD)' sh tests/check/run_tests.sh \
-	    $(sort $(TESTS)) tests/check/test_mixing.sh
+	    $(sort $(TESTS)) tests/check/test_mixing.sh tests/check/test_readme.sh
 
 # --- the rest ------------------------------------------------------------
 
