@@ -1,8 +1,9 @@
 /* A folder for a test's files, and what the tested code says on standard
- * error.  Failures here are failures of the test's surroundings: they abort.
- * Comes after close.h. */
+ * error.  Failures here are failures of the test's surroundings: they abort. */
 #ifndef TESTS_SCRATCH_H
 #define TESTS_SCRATCH_H
+
+#include "close.h"
 
 #include <fcntl.h>
 #include <ftw.h>
