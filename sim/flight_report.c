@@ -199,6 +199,11 @@ static int write_tables(const struct flight_report *r, const char *folder)
 
 /* --- plots --------------------------------------------------------------- */
 
+static int fresh(const struct flight_run *run)
+{
+    return strcmp(run->positions, "fresh") == 0;
+}
+
 /* The runs of one model, from `first`, in one picture. */
 static int plot_model(const struct flight_report *r, int first, int count,
                       const char *folder)
@@ -206,7 +211,7 @@ static int plot_model(const struct flight_report *r, int first, int count,
     const struct flight_run *runs = r->runs + first;
     const char *time = r->data->time_name;
     struct plot_series track[1 + WAYS], error[1 + WAYS];
-    char file[WAYS][128], north[16], name[128], title[128];
+    char file[WAYS][128], legend[WAYS][48], north[16], name[128], title[128];
     int i, status;
 
     snprintf(north, sizeof north, "x%d", runs->source->motions[0].order);
@@ -216,20 +221,20 @@ static int plot_model(const struct flight_report *r, int first, int count,
                                      "position held", PLOT_SHADE };
     for (i = 0; i < count; i++) {
         snprintf(file[i], sizeof file[i], "%s.csv", runs[i].name);
-        track[1 + i] = (struct plot_series){ file[i], "x0", north,
-                                             runs[i].positions, PLOT_LINE };
+        snprintf(legend[i], sizeof legend[i], "held positions %s",
+                 fresh(&runs[i]) ? "taken as fresh" : "recognised");
+        track[1 + i] = (struct plot_series){ file[i], "x0", north, legend[i],
+                                             PLOT_LINE };
         error[1 + i] = (struct plot_series){ "track.csv", time, runs[i].name,
-                                             runs[i].positions, PLOT_LINE };
+                                             legend[i], PLOT_LINE };
     }
     snprintf(name, sizeof name, "track_%s", runs->model);
-    snprintf(title, sizeof title, "Track: %s, held positions taken as",
-             runs->model);
+    snprintf(title, sizeof title, "Track: %s", runs->model);
     status = plot_track(folder, name, title, track, 1 + count);
     if (status != 0)
         return status;
     snprintf(name, sizeof name, "velocity_error_%s", runs->model);
-    snprintf(title, sizeof title, "Velocity error: %s, held positions taken "
-             "as", runs->model);
+    snprintf(title, sizeof title, "Velocity error: %s", runs->model);
     return plot_errors(folder, name, title, "velocity error in m/s", error,
                        1 + count);
 }
@@ -257,8 +262,7 @@ static int plot_run_modes(const struct flight_report *r,
     snprintf(file, sizeof file, "%s.csv", run->name);
     snprintf(name, sizeof name, "modes_%s", run->name);
     snprintf(title, sizeof title, "Mode probabilities: %s, held positions %s",
-             run->model, strcmp(run->positions, "fresh") == 0
-             ? "taken as fresh" : "recognised");
+             run->model, fresh(run) ? "taken as fresh" : "recognised");
     return plot_modes(folder, name, title, file, r->data->time_name,
                       M <= MOST ? names : NULL, M);
 }
