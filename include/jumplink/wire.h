@@ -39,6 +39,7 @@ jl_u32 jl_crc32(jl_u32 crc, const unsigned char *p, int len);
 
 #define JL_FRAME_VERSION 1
 #define JL_FRAME_HEADER 32
+#define JL_FRAME_FROM 5         /* the octet that names the sender */
 #define JL_FRAME_TRAILER 4      /* CRC-32 of all before it */
 #define JL_FRAME_PAYLOAD (JL_FRAME_MAX - JL_FRAME_HEADER - JL_FRAME_TRAILER)
 

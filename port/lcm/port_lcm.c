@@ -21,7 +21,6 @@
 #define RUN_MAX 16
 #define NODES_MAX 256
 #define NEVER LLONG_MAX
-#define FROM_AT 5               /* the octet of a frame that names its sender */
 
 /* "JL." run "." node and its 0; LCM's own header before it has 8 octets.  A
  * message longer than 1400 in all would be cut up by networks, and a lossy one
@@ -122,7 +121,7 @@ static void on_message(const lcm_recv_buf_t *buf, const char *channel,
     int from;
 
     (void)channel;
-    from = buf->data_size > FROM_AT ? frame[FROM_AT] : l->nodes;
+    from = buf->data_size > JL_FRAME_FROM ? frame[JL_FRAME_FROM] : l->nodes;
     if (from == l->node || from >= l->nodes || buf->data_size > JL_FRAME_MAX)
         l->strays++;
     else

@@ -8,7 +8,7 @@ enum {                          /* where a field begins */
     AT_VERSION = 2,
     AT_KIND = 3,
     AT_NUMBER = 4,
-    AT_FROM = 5,
+    AT_FROM = JL_FRAME_FROM,
     AT_TO = 6,
     AT_ZERO = 7,
     AT_SESSION = 8,
