@@ -463,6 +463,29 @@ static void test_imm_init_state(void **state)
     }
 }
 
+/* The identity that init leaves is the one that chain sets. */
+static void test_imm_init_chain(void **state)
+{
+    jl_real z[Z_MAX];
+    int mixing;
+
+    (void)state;
+    for (mixing = 0; mixing <= 1; mixing++) {
+        make(3, 2, 1);
+        make_sticky(1);
+        make_z(z);
+        bind(&twin, &jl_kf_joseph, mixing);
+        bind(&rig, &jl_kf_joseph, mixing);
+        jl_imm_init(&rig.imm, 3, rig.modes, &jl_kf_joseph, mixing,
+                    rig.mem + EDGE, JL_IMM_STATE(3, 2));
+        jl_imm_set(&rig.imm, in.x, in.P, in.mu, spoilt());
+        assert_int_equal(rig.imm.sticky, twin.imm.sticky);
+        assert_int_equal(step(&rig, z), JL_OK);
+        assert_int_equal(step(&twin, z), JL_OK);
+        check_same(&rig.imm, &twin.imm);
+    }
+}
+
 /* As many modes as there may be. */
 static void test_imm_most_modes(void **state)
 {
@@ -595,6 +618,9 @@ static void test_imm_set_refuses(void **state)
     assert_same_bits(rig.imm.P, in.P, 12 * sizeof *in.P);
     assert_same_bits(rig.imm.mu, in.mu, 3 * sizeof *in.mu);
     assert_true(rig.imm.logmu[0] == -INF_ && rig.imm.logmu[1] == 0);
+    in.P[9] *= 1 + 2 * JL_EPSILON;      /* P is symmetric all the same */
+    assert_int_equal(set_status(), JL_OK);
+    check_symmetric(rig.imm.P + 8, 2);
 }
 
 /* --- the chain's kind --------------------------------------------------- */
@@ -1034,6 +1060,35 @@ static void test_imm_underflow_under_jumps(void **state)
     }
 }
 
+/* Two improbable modes jump to each other, below every number. */
+static void test_imm_underflowed_modes_mix(void **state)
+{
+    static const jl_real Pi[9] = { 1, 0, 0, 0, JL_C(0.7), JL_C(0.3),
+                                   0, JL_C(0.2), JL_C(0.8) };
+    jl_real z;
+    int mixing, j, k;
+
+    (void)state;
+    for (mixing = 0; mixing <= 1; mixing++) {
+        make(3, 1, 1);
+        for (j = 0; j < 3; j++) {
+            in.F[j][0] = in.G[j][0] = JL_C(0.5);
+            in.w_bar[j] = j == 0 ? 3 : (jl_real)(-2 - j);
+            in.H[j][0] = in.R[j][0] = 1;
+        }
+        memcpy(in.Pi, Pi, sizeof Pi);
+        bind(&rig, &jl_kf_joseph, mixing);
+        book_start();
+        for (k = 0; k < 300; k++) {
+            z = 3 + rnd() / 8;
+            assert_int_equal(step(&rig, &z), JL_OK);
+            book_step(&z);
+            check_book(&rig.imm, 1.0e5 * EPS, 300 * 1000 * EPS);
+        }
+        assert_true(book.logmu[1] < -1000 && book.logmu[2] < -1000);
+    }
+}
+
 /* Estimates and covariances as large as they may be. */
 static void test_imm_mixing_cannot_overflow(void **state)
 {
@@ -1294,6 +1349,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_imm_init_refuses),
         cmocka_unit_test(test_imm_init_state),
+        cmocka_unit_test(test_imm_init_chain),
         cmocka_unit_test(test_imm_most_modes),
         cmocka_unit_test(test_imm_chain_refuses),
         cmocka_unit_test(test_imm_set_refuses),
@@ -1308,6 +1364,7 @@ int main(void)
         cmocka_unit_test(test_imm_mode_that_cannot_be_entered),
         cmocka_unit_test(test_imm_evidence),
         cmocka_unit_test(test_imm_underflow_under_jumps),
+        cmocka_unit_test(test_imm_underflowed_modes_mix),
         cmocka_unit_test(test_imm_mixing_cannot_overflow),
         cmocka_unit_test(test_imm_routes_to_the_same_bits),
         cmocka_unit_test(test_imm_stages_out_of_order),

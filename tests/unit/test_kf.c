@@ -436,6 +436,20 @@ static void test_kf_joseph_keeps_semidefinite(void **state)
     }
 }
 
+/* S = P + R = P in rounding: joseph still knows that P becomes R. */
+static void test_kf_joseph_keeps_what_is_small(void **state)
+{
+    const jl_real z = 1, small = JL_EPSILON / 16;
+
+    (void)state;
+    make_scalar(&rig, &jl_kf_joseph, 1, 0, small, 0, 1);
+    assert_int_equal(call(STEP, &z), JL_OK);
+    assert_close(rig.kf.P[0], small, 4 * EPS * (double)small);
+    make_scalar(&rig, &jl_kf_joseph, 1, 0, 1, 0, small);
+    assert_int_equal(call(STEP, &z), JL_OK);
+    assert_close(rig.kf.P[0], small, 4 * EPS * (double)small);
+}
+
 /* --- calls -------------------------------------------------------------- */
 
 static void test_kf_step_is_predict_and_update(void **state)
@@ -657,6 +671,7 @@ int main(void)
         cmocka_unit_test(test_kf_scalar_closed_form),
         cmocka_unit_test(test_kf_largest_sizes),
         cmocka_unit_test(test_kf_joseph_keeps_semidefinite),
+        cmocka_unit_test(test_kf_joseph_keeps_what_is_small),
         cmocka_unit_test(test_kf_step_is_predict_and_update),
         cmocka_unit_test(test_kf_scratch_means_nothing),
         cmocka_unit_test(test_kf_missing_measurement),

@@ -311,7 +311,7 @@ static jl_motion motion_of(int kind, int axes, int order, jl_real rate)
     motion.kind = kind;
     motion.axes = axes;
     motion.order = order;
-    motion.accel_std = JL_C(1.5);
+    motion.accel_std = JL_C(1.3);
     motion.turn_rate = rate;
     motion.sigma_z = JL_C(0.7);
     return motion;
@@ -352,7 +352,7 @@ static void check_motion(int kind, int axes, int order, jl_real dt)
                 assert_close(a->F[i * n + j], same ? F[row][col] : 0,
                              tolerance);
             assert_close(a->W[i * n + j],
-                         same ? g[row] * g[col] * 2.25L : 0, tolerance);
+                         same ? g[row] * g[col] * 1.69L : 0, tolerance);
         }
         for (j = 0; j < axes; j++) {
             assert_close(a->G[i * axes + j], i / order == j ? g[row] : 0,
@@ -362,7 +362,7 @@ static void check_motion(int kind, int axes, int order, jl_real dt)
     }
     for (i = 0; i < axes; i++)
         for (j = 0; j < axes; j++) {
-            assert_close(a->Q[i * axes + j], i == j ? 2.25 : 0, 4 * EPS);
+            assert_close(a->Q[i * axes + j], i == j ? 1.69 : 0, 4 * EPS);
             assert_close(a->R[i * axes + j], i == j ? 0.49 : 0, EPS);
         }
     make(&other, n, axes, axes);
@@ -381,7 +381,7 @@ static void check_motion(int kind, int axes, int order, jl_real dt)
 
 static void test_motion_closed_forms(void **state)
 {
-    static const jl_real dts[] = { 0, JL_C(0.001), JL_C(0.1), 1, JL_C(2.5),
+    static const jl_real dts[] = { 0, JL_C(0.001), JL_C(0.1), 1, JL_C(2.7),
                                    60 };
     int k, axes;
 
