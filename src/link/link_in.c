@@ -22,10 +22,8 @@ static void take_ack(jl_link *link, const jl_frame *frame, jl_u32 now)
         link->wait_us = link->config.rto_us;
         link->sent_at = now;
     }
-    if (frame->kind == JL_FRAME_ACK && frame->seq == 1) {
-        link->out_next = link->out_first;       /* room again: send it all */
-        link->wait_us = link->config.rto_us;
-    }
+    if (frame->kind == JL_FRAME_ACK && frame->seq == 1)
+        link->out_next = link->out_first;       /* room again: do not wait */
 }
 
 /* Every piece of a message but the last is full, so that a message cannot

@@ -592,6 +592,7 @@ static void test_link_hello_to_an_up_link(void **state)
     assert_true(jl_link_output(&w.e[1].link, out, w.now) > 0);
     assert_int_equal(out[3], JL_FRAME_DOUBT);
     assert_int_equal(jl_get_u32(out + 12), 0x7777);
+    assert_int_equal(jl_get_u32(out + 16), 0);
     assert_int_equal(jl_link_output(&w.e[1].link, out, w.now), 0);
     assert_int_equal(forge(JL_FRAME_HELLO, 0x7777, 0x2222, 0, 0, 0), JL_EPEER);
     assert_int_equal(forge(JL_FRAME_DATA, 0x7777, 0x2222, 0, 0,
@@ -614,6 +615,106 @@ static void test_link_hello_to_an_up_link(void **state)
     assert_int_equal(jl_link_output(&w.e[1].link, out, w.now), 0);
 }
 
+static void test_link_hello_repeats(void **state)
+{
+    static const long waits[] = { 20000, 40000, 80000, 100000, 100000 };
+    unsigned char out[JL_FRAME_MAX];
+    jl_link *l = &w.e[1].link;
+    int i;
+
+    (void)state;
+    begin(clean, 1);
+    assert_int_equal(jl_link_timer(l, w.now), 0);
+    for (i = 0; i < 5; i++) {
+        assert_int_equal(jl_link_output(l, out, w.now), 36);
+        assert_int_equal(out[3], JL_FRAME_HELLO);
+        assert_int_equal(jl_get_u32(out + 8), 0x2222);
+        assert_int_equal(jl_get_u32(out + 12), 0);
+        assert_int_equal(jl_get_u32(out + 16), 0);
+        assert_int_equal(jl_link_output(l, out, w.now), 0);
+        assert_int_equal(jl_link_timer(l, w.now), waits[i]);
+        assert_int_equal(jl_link_output(l, out, w.now + (jl_u32)waits[i] - 1),
+                         0);
+        w.now += (jl_u32)waits[i];
+    }
+    /* a HELLO is answered at once */
+    jl_link_output(l, out, w.now);
+    assert_int_equal(forge(JL_FRAME_HELLO, 0x1111, 0, 0, 0, 0), JL_OK);
+    assert_int_equal(jl_link_timer(l, w.now), 0);
+    assert_int_equal(jl_link_output(l, out, w.now), 36);
+    assert_int_equal(out[3], JL_FRAME_HELLO);
+    assert_int_equal(jl_get_u32(out + 12), 0x1111);
+    assert_int_equal(jl_link_output(l, out, w.now), 0);
+    assert_int_equal(l->up, 0);
+    /* and once up, it is the data's waiting time that counts */
+    assert_int_equal(forge(JL_FRAME_HELLO, 0x1111, 0x2222, 0, 0, 0), JL_OK);
+    assert_int_equal(jl_link_output(l, out, w.now), 36);
+    assert_int_equal(out[3], JL_FRAME_ACK);
+    assert_int_equal(l->count.acks, 1);
+    assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
+    assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
+    assert_int_equal(jl_link_output(l, out, w.now), 37);
+    assert_int_equal(jl_link_output(l, out, w.now), 37);
+    assert_int_equal(jl_link_timer(l, w.now), 20000);
+}
+
+/* Room is told once, when half of the ring is free. */
+static void test_link_room_at_half(void **state)
+{
+    unsigned char out[JL_FRAME_MAX];
+    jl_link *l = &w.e[1].link;
+    jl_u32 i, window;
+    int status;
+
+    (void)state;
+    up();
+    window = (jl_u32)l->window;
+    assert_int_equal(window, 6);
+    for (i = 0; i < window; i++)
+        assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, i, 0, 4), JL_OK);
+    assert_true(jl_link_output(l, out, w.now) > 0);
+    assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, i, 0, 4), JL_EAGAIN);
+    assert_int_equal(l->count.early, 1);
+    for (i = 0; i < window; i++) {
+        assert_int_equal(jl_link_timer(l, w.now), -1);
+        assert_int_equal(jl_link_recv(l, msg, MAX_LEN), 4);
+        if (i == 2) {
+            assert_int_equal(jl_link_timer(l, w.now), 0);
+            assert_true(jl_link_output(l, out, w.now) > 0);
+            assert_int_equal(out[3], JL_FRAME_ACK);
+            assert_int_equal(jl_get_u32(out + 16), 1);
+            assert_int_equal(jl_get_u32(out + 20), window);
+        }
+    }
+    assert_int_equal(jl_link_timer(l, w.now), -1);
+    /* not when what was dropped has come by itself */
+    for (i = window; i < 2 * window; i++)
+        forge(JL_FRAME_LAST, 0x1111, 0x2222, i, 0, 4);
+    forge(JL_FRAME_LAST, 0x1111, 0x2222, i, 0, 4);
+    assert_int_equal(jl_link_recv(l, msg, MAX_LEN), 4);
+    assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, i, 0, 4), JL_OK);
+    while (jl_link_recv(l, msg, MAX_LEN) >= 0)
+        ;
+    while (status = jl_link_output(l, out, w.now), status > 0)
+        assert_int_equal(jl_get_u32(out + 16), 0);
+    /* the other side of it: told of room, send at once */
+    for (i = 0; i < 3; i++)
+        assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
+    while (jl_link_output(l, out, w.now) > 0)
+        ;
+    assert_int_equal(forge(JL_FRAME_ACK, 0x1111, 0x2222, 1, 1, 0), JL_OK);
+    assert_int_equal(jl_link_timer(l, w.now), 0);
+    assert_int_equal(jl_link_output(l, out, w.now), 37);
+    assert_int_equal(jl_get_u32(out + 16), 1);
+    assert_int_equal(jl_link_output(l, out, w.now), 37);
+    assert_int_equal(jl_get_u32(out + 16), 2);
+    assert_int_equal(jl_link_output(l, out, w.now), 0);
+    /* progress starts the waiting time anew */
+    w.now += 15000;
+    assert_int_equal(forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, 2, 0), JL_OK);
+    assert_int_equal(jl_link_timer(l, w.now), 20000);
+}
+
 static void test_link_before_it_is_up(void **state)
 {
     unsigned char out[JL_FRAME_MAX];
@@ -633,6 +734,7 @@ static void test_link_before_it_is_up(void **state)
     assert_true(jl_link_output(&w.e[1].link, out, w.now) > 0);
     assert_int_equal(out[3], JL_FRAME_ALIVE);
     assert_int_equal(jl_get_u32(out + 12), 0x1110);
+    assert_int_equal(jl_get_u32(out + 16), 0);
     assert_int_equal(w.e[1].link.up, 0);
     assert_int_equal(jl_link_recv(&w.e[1].link, msg, MAX_LEN), JL_EAGAIN);
     /* data of one who knows us do */
@@ -941,9 +1043,12 @@ static void test_link_init_refuses(void **state)
     assert_memory_equal(&l, &before, sizeof l);
     assert_int_equal(jl_link_init(&l, &good, w.e[0].mem, MEM, 0), JL_OK);
     good.number = 4;
+    good.from = 255;
+    good.to = 0;
+    good.session = 0xFFFFFFFFu;
     good.max_len = 0;
     good.slots = 1;
-    good.ack_us = 0;
+    good.rto_us = good.ack_us = JL_LINK_MAX_US;
     assert_int_equal(jl_link_init(&l, &good, w.e[0].mem, JL_LINK_MEM(0, 1), 0),
                      JL_OK);
 }
@@ -1000,6 +1105,8 @@ int main(void)
         cmocka_unit_test(test_link_replay_of_a_session),
         cmocka_unit_test(test_link_replay_of_itself),
         cmocka_unit_test(test_link_hello_to_an_up_link),
+        cmocka_unit_test(test_link_hello_repeats),
+        cmocka_unit_test(test_link_room_at_half),
         cmocka_unit_test(test_link_before_it_is_up),
         cmocka_unit_test(test_link_refuses_foreign),
         cmocka_unit_test(test_link_hostile_peer),
