@@ -975,6 +975,10 @@ static void test_link_backs_off(void **state)
         assert_true(jl_link_output(l, out, w.now) > 0);
         assert_int_equal(jl_get_u32(out + 16), 0);
     }
+    /* an acknowledgement of nothing new is no progress */
+    w.now += 1000;
+    forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, 0, 0);
+    assert_int_equal(jl_link_timer(l, w.now), 319000);
     /* progress: the rest at once, and the first waiting time again */
     forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, 1, 0);
     assert_true(jl_link_output(l, out, w.now) > 0);
