@@ -17,7 +17,7 @@
 
 #define URL "udpm://239.255.76.67:7667?ttl=0"
 #define CHILD_SECONDS 30U
-#define LINGER_US 1000000L
+#define LINGER_US 10000000L     /* losses may take several repetitions */
 
 static int net_errno;           /* why there is no network; 0: there is one */
 static jl_lcm *lcm;             /* this process's node                      */

@@ -60,7 +60,7 @@ static void be_pe(const struct run *run, int pe, pid_t parent)
     if (lcm != NULL)
         status = par_pe(pe, run->npe, run->M, run->sticky, run->form, to,
                         from);
-    jl_lcm_close(lcm, 2000000);
+    jl_lcm_close(lcm, 10000000);
     _exit(status == JL_OK ? 0 : 1);
 }
 
@@ -81,7 +81,7 @@ static void compare(const struct run *run)
     lcm = join(run, run->npe, to, from);
     if (lcm != NULL)
         host = par_host(&trace, run->M, to[0], from[0]);
-    jl_lcm_close(lcm, 2000000);
+    jl_lcm_close(lcm, 10000000);
     for (pe = 0; pe < run->npe; pe++) {
         if (host != JL_OK)
             kill(pid[pe], SIGKILL);
