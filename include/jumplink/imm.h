@@ -26,8 +26,9 @@
  * Equal in exact arithmetic; found out by jl_imm_chain.
  *
  * A step computes into a second set of estimates, and weigh, the last stage
- * that changes the filter's state, makes it the valid one.  So on any error
- * the filter is as it was before the step.
+ * that changes the filter's state (x, P, mu, logmu), makes it the valid one.
+ * So on any error the state is as it was before the step; xhat, Phat and
+ * loglik are results, and combine brings them up to the state at any time.
  */
 #ifndef JL_IMM_H
 #define JL_IMM_H
@@ -116,7 +117,7 @@ int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch);
 /* The four stages, in this order; mix may be called at any time and starts the
  * step anew; combine combines the present state and may be called at any time.
  * Returns: as jl_imm_step, and JL_EORDER for filter without mix, or weigh
- * without filter. */
+ * without filter or after a failure.  chain and set end a step under way. */
 int jl_imm_mix(jl_imm *imm, jl_real *scratch);
 int jl_imm_filter(jl_imm *imm, const jl_real *z, jl_real *scratch);
 int jl_imm_weigh(jl_imm *imm);
@@ -125,7 +126,8 @@ void jl_imm_combine(jl_imm *imm);
 /* The pieces of mix and filter, for filters spread over several processors:
  * mix = foresee, then mix_mode for every j; filter = predict_mode and
  * update_mode for every j.  A processor does so for the modes it owns; l[j],
- * xw[j], Pw[j] of the others come to it by message; then it calls weigh.
+ * xw[j], Pw[j] of the others come to it by message; then, if no mode has failed
+ * anywhere, it calls weigh.  (It must own a mode: update_mode opens weigh.)
  * foresee computes c of all modes from mu of all modes; mix_mode, predict_mode
  * and update_mode leave their result in xw[j], Pw[j], and l[j]. */
 void jl_imm_foresee(jl_imm *imm);

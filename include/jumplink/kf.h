@@ -8,9 +8,10 @@
  *     loglik    log N(nu; 0, S)
  *
  * The forms are equal in exact arithmetic.  Joseph keeps P positive
- * semidefinite where measurements are far better than the prior; standard
- * costs about two thirds of it and is fine otherwise.  A form is a const table
- * of functions: a program that names one does not link the other.
+ * semidefinite where measurements are far better than the prior, as long as
+ * R / (H P- H') is above the number type's epsilon; standard is cheaper and
+ * fine otherwise.  A form is a const table of functions: a program that names
+ * one does not link the other.
  */
 #ifndef JL_KF_H
 #define JL_KF_H
@@ -23,7 +24,7 @@ extern "C" {
 #endif
 
 /* One step's pieces, on arrays: x [n], P [n,n]; outputs must not overlap
- * inputs.  What the array P holds is the form's own affair; `cov` tells.
+ * inputs.
  *     predict   returns JL_OK or JL_ENONFINITE
  *     update    *loglik is set; returns JL_OK, JL_ESINGULAR, JL_ENONFINITE
  * On error the outputs are undefined, and no other array has changed. */

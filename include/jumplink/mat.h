@@ -63,10 +63,10 @@ int jl_vec_within(const jl_real *v, int n, jl_real limit);
 /* Check a covariance A [n,n]: JL_OK, or the first of
  *     JL_ENONFINITE  an element is NaN, infinite or above JL_LARGE^2
  *     JL_EASYM       |A_ij - A_ji| > 64 eps sqrt(|A_ii| |A_jj|)
- *     JL_EDEF        an eigenvalue is negative beyond rounding: Cholesky of
- *                    the matrix scaled to a unit diagonal meets a pivot below
- *                    -64 n eps, or a zero row that is not zero
- * semidefinite is enough; `work` [n,n].                             n^3/6  */
+ *     JL_EDEF        not positive semidefinite beyond rounding: scaled to a
+ *                    unit diagonal and eliminated by its largest pivots down
+ *                    to 64 n eps, what is left is above twice that
+ * work [n,n].                                                       n^3/3  */
 int jl_mat_check_cov(const jl_real *A, jl_real *work, int n);
 
 #ifdef __cplusplus

@@ -82,15 +82,18 @@ typedef struct jl_motion {
 /* Sizes of a motion's mode: n = axes order, m = p = axes. */
 
 /* Fill a mode (of the sizes above) for time step dt [s] >= 0; over dt = 0
- * nothing moves.  Cheap enough for every step of an irregular record.
- * Returns JL_OK, JL_EDIM (sizes, axes, order, kind), JL_ENONFINITE, JL_ERANGE
- * (accel_std < 0, sigma_z <= 0, |turn_rate| dt > 1024), JL_ETIME (dt < 0);
- * *mode is untouched on error. */
+ * positions and velocities stay.  Cheap enough for every step of an irregular
+ * record.
+ * Returns JL_OK, JL_EDIM (sizes, axes, order, kind), JL_ENONFINITE (a number
+ * of the motion or dt above sqrt(JL_LARGE), or a product above JL_LARGE),
+ * JL_ERANGE (accel_std < 0, sigma_z^2 not above 0, |turn_rate| dt > 1024),
+ * JL_ETIME (dt < 0); *mode is untouched on error. */
 int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt);
 
 /* The state after a first measurement z [axes]: x [n] at z with velocity 0 and
  * acceleration 0; P [n,n] diagonal: sigma_z^2, v0_std^2, a0_std^2 an axis.
- * Returns JL_OK, JL_EDIM, JL_ENONFINITE, JL_ERANGE (a deviation <= 0). */
+ * Returns JL_OK, JL_EDIM, JL_ENONFINITE, JL_ERANGE (a deviation <= 0);
+ * x and P are untouched on error. */
 int jl_motion_start(jl_real *x, jl_real *P, const jl_motion *motion,
                     const jl_real *z, jl_real v0_std, jl_real a0_std);
 

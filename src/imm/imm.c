@@ -3,12 +3,16 @@
 
 #include "mat/mat_k.h"
 
+/* Given probabilities sum to 1 within a tolerance; kept ones, exactly. */
 static void set_mu(jl_imm *imm, const jl_real *mu)
 {
+    jl_real sum = 0;
     int j;
 
+    for (j = 0; j < imm->M; j++)
+        sum += mu != NULL ? mu[j] : 1;
     for (j = 0; j < imm->M; j++) {
-        imm->mu[j] = mu != NULL ? mu[j] : 1 / (jl_real)imm->M;
+        imm->mu[j] = (mu != NULL ? mu[j] : 1) / sum;
         imm->logmu[j] = jl_log(imm->mu[j]);
     }
 }

@@ -48,20 +48,45 @@ void jl_imm_foresee(jl_imm *imm)
     imm->stage = JLI_MIXED;
 }
 
-/* mu_ij = p mu_i / c_j for a jump of probability p from mode i to mode j */
-static jl_real share(const jl_imm *imm, jl_real p, int i, int j)
+/* Weights from logarithms are only as good as the logarithms are small. */
+static void normalise(jl_real *w, int n)
 {
-    if (imm->c[j] > JLI_SMALL)
-        return p * imm->mu[i] / imm->c[j];
-    return jl_exp(jl_log(p) + imm->logmu[i] - imm->logc[j]);
+    jl_real sum = 0;
+    int i;
+
+    for (i = 0; i < n; i++)
+        sum += w[i];
+    for (i = 0; i < n; i++)
+        w[i] /= sum;
 }
 
-/* The same for the jump out of the combined estimate, of probability v_j. */
-static jl_real share_combined(const jl_imm *imm, int j)
+/* w_i = mu_ij = Pi[i][j] mu_i / c_j */
+static void shares(jl_real *w, const jl_imm *imm, int j)
 {
-    if (imm->c[j] > JLI_SMALL)
-        return imm->v[j] / imm->c[j];
-    return jl_exp(jl_log(imm->v[j]) - imm->logc[j]);
+    int i, M = imm->M;
+
+    if (imm->c[j] > JLI_SMALL) {
+        for (i = 0; i < M; i++)
+            w[i] = imm->Pi[i * M + j] * imm->mu[i] / imm->c[j];
+        return;
+    }
+    for (i = 0; i < M; i++)
+        w[i] = jl_exp(jl_log(imm->Pi[i * M + j]) + imm->logmu[i]
+                      - imm->logc[j]);
+    normalise(w, M);
+}
+
+/* w = { a, b } = { lambda_j mu_j, v_j } / c_j */
+static void sticky_shares(jl_real *w, const jl_imm *imm, int j)
+{
+    if (imm->c[j] > JLI_SMALL) {
+        w[0] = imm->lambda[j] * imm->mu[j] / imm->c[j];
+        w[1] = imm->v[j] / imm->c[j];
+        return;
+    }
+    w[0] = jl_exp(jl_log(imm->lambda[j]) + imm->logmu[j] - imm->logc[j]);
+    w[1] = jl_exp(jl_log(imm->v[j]) - imm->logc[j]);
+    normalise(w, 2);
 }
 
 /* --- mixing -------------------------------------------------------------- */
@@ -72,9 +97,11 @@ static void mix_sticky(jl_real *x0, jl_real *P0, const jl_imm *imm, int j,
 {
     int n = imm->n, r, s;
     const jl_real *x = imm->x + j * n, *P = imm->P + j * n * n;
-    jl_real a = share(imm, imm->lambda[j], j, j);
-    jl_real b = share_combined(imm, j);
+    jl_real w[2], a, b;
 
+    sticky_shares(w, imm, j);
+    a = w[0];
+    b = w[1];
     for (r = 0; r < n; r++) {
         x0[r] = a * x[r] + b * imm->xhat[r];
         d[r] = x[r] - imm->xhat[r];
@@ -89,7 +116,7 @@ static void mix_sticky(jl_real *x0, jl_real *P0, const jl_imm *imm, int j,
 
 void jl_imm_mix_mode(jl_imm *imm, int j, jl_real *scratch)
 {
-    int i, M = imm->M, n = imm->n;
+    int M = imm->M, n = imm->n;
     jl_real *x0 = imm->xw + j * n, *P0 = imm->Pw + j * n * n;
     jl_real *w = scratch, *d = w + M;
 
@@ -99,8 +126,7 @@ void jl_imm_mix_mode(jl_imm *imm, int j, jl_real *scratch)
     } else if (imm->sticky) {
         mix_sticky(x0, P0, imm, j, d);
     } else {
-        for (i = 0; i < M; i++)
-            w[i] = share(imm, imm->Pi[i * M + j], i, j);
+        shares(w, imm, j);
         jli_pool(x0, P0, w, imm->x, imm->P, d, M, n);
     }
 }

@@ -4,7 +4,8 @@
 
 #include "jumplink/imm.h"
 
-enum { JLI_IDLE = 0, JLI_MIXED = 1, JLI_FILTERED = 2 };
+/* What may come next: JLI_FAILED ends a step of which a mode has failed. */
+enum { JLI_IDLE = 0, JLI_MIXED = 1, JLI_FILTERED = 2, JLI_FAILED = 3 };
 
 /* Probabilities above this are summed as they are: terms of such a sum that
  * have underflowed are below eps^2 of it.  Sums below it, zero included, are

@@ -13,6 +13,8 @@ int jl_imm_predict_mode(jl_imm *imm, int j, jl_real *scratch)
     if (status == JL_OK) {
         jli_copy(x, xp, n);
         jli_copy(P, Pp, n * n);
+    } else {
+        imm->stage = JLI_FAILED;
     }
     return status;
 }
@@ -24,7 +26,8 @@ int jl_imm_update_mode(jl_imm *imm, int j, const jl_real *z,
     jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
     jl_real *xu = scratch, *Pu = xu + n;
 
-    imm->stage = JLI_FILTERED;
+    if (imm->stage == JLI_MIXED)
+        imm->stage = JLI_FILTERED;
     imm->missing = z == NULL;
     if (z == NULL) {
         imm->l[j] = 0;
@@ -35,6 +38,8 @@ int jl_imm_update_mode(jl_imm *imm, int j, const jl_real *z,
     if (status == JL_OK) {
         jli_copy(x, xu, n);
         jli_copy(P, Pu, n * n);
+    } else {
+        imm->stage = JLI_FAILED;
     }
     return status;
 }
@@ -50,8 +55,6 @@ int jl_imm_filter(jl_imm *imm, const jl_real *z, jl_real *scratch)
         if (status == JL_OK)
             status = jl_imm_update_mode(imm, j, z, scratch);
     }
-    if (status != JL_OK)
-        imm->stage = JLI_IDLE;
     return status;
 }
 

@@ -39,6 +39,8 @@ JL_INLINE int jli_kf_innovate(jl_real *HP, jl_real *L, jl_real *y,
     jl_real twice = (jl_real)m * JLI_LOG_2PI;
     int a;
 
+    if (!jl_vec_within(z, m, JL_LARGE))
+        return JL_ENONFINITE;
     jli_mul(HP, mode->H, Pp, m, n, n);
     jli_mul_t_sym(L, HP, mode->H, mode->R, m, n);
     if (!jl_vec_within(L, m * m, JL_REAL_MAX))

@@ -52,35 +52,49 @@ static int normalise(jl_real *B, const jl_real *A, int n)
     return JL_OK;
 }
 
-/* Cholesky of B in its lower triangle.  A pivot within tol of 0 counts as 0,
- * and then its column must vanish, up to the root of tol. */
+static void swap(jl_real *a, jl_real *b)
+{
+    jl_real t = *a;
+
+    *a = *b;
+    *b = t;
+}
+
+/* Bring element (best, best) to (k, k) by exchanging rows and columns. */
+static void bring(jl_real *B, int n, int k, int best)
+{
+    int i;
+
+    for (i = 0; i < n; i++)
+        swap(&B[k * n + i], &B[best * n + i]);
+    for (i = 0; i < n; i++)
+        swap(&B[i * n + k], &B[i * n + best]);
+}
+
+/* Eliminate by the largest pivot left; when none is above rounding, what is
+ * left must vanish.  Without pivoting a small pivot would magnify rounding
+ * until a valid matrix of low rank looks indefinite.  B is overwritten. */
 static int semidefinite(jl_real *B, int n)
 {
-    jl_real tol = 64 * (jl_real)n * JL_EPSILON, root = jli_sqrt(tol);
-    int i, j, k;
+    jl_real tol = 64 * (jl_real)n * JL_EPSILON;
+    int i, j, k, best;
 
-    for (j = 0; j < n; j++) {
-        jl_real pivot = B[j * n + j];
-
-        for (k = 0; k < j; k++)
-            pivot -= B[j * n + k] * B[j * n + k];
-        if (pivot < -tol)
-            return 0;
-        pivot = pivot > tol ? jli_sqrt(pivot) : 0;
-        for (i = j + 1; i < n; i++) {
-            jl_real s = B[i * n + j];
-
-            for (k = 0; k < j; k++)
-                s -= B[i * n + k] * B[j * n + k];
-            if (pivot > 0)
-                s /= pivot;
-            else if (jli_abs(s) > root)
-                return 0;
-            else
-                s = 0;
-            B[i * n + j] = s;
-        }
+    for (k = 0; k < n; k++) {
+        best = k;
+        for (i = k + 1; i < n; i++)
+            if (B[i * n + i] > B[best * n + best])
+                best = i;
+        bring(B, n, k, best);
+        if (B[k * n + k] <= tol)
+            break;
+        for (i = k + 1; i < n; i++)
+            for (j = k + 1; j < n; j++)
+                B[i * n + j] -= B[i * n + k] * B[k * n + j] / B[k * n + k];
     }
+    for (i = k; i < n; i++)
+        for (j = k; j < n; j++)
+            if (jli_abs(B[i * n + j]) > 2 * tol)
+                return 0;
     return 1;
 }
 

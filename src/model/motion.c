@@ -7,16 +7,16 @@ static int motion_sizes(const jl_motion *motion)
 {
     int order = motion->order;
 
-    if (motion->axes < 1 || motion->axes * 3 > JL_MAX_STATES)
+    if ((order != 2 && order != 3) || motion->axes < 1
+        || motion->axes > JL_MAX_STATES / order)
         return JL_EDIM;
     switch (motion->kind) {
     case JL_MOTION_CV:
-        return order == 2 || order == 3 ? JL_OK : JL_EDIM;
+        return JL_OK;
     case JL_MOTION_CA:
         return order == 3 ? JL_OK : JL_EDIM;
     case JL_MOTION_CT:
-        return motion->axes == 2 && (order == 2 || order == 3)
-            ? JL_OK : JL_EDIM;
+        return motion->axes == 2 ? JL_OK : JL_EDIM;
     default:
         return JL_EDIM;
     }
@@ -33,8 +33,8 @@ static int motion_numbers(const jl_motion *motion, jl_real dt)
     v[3] = motion->kind == JL_MOTION_CT ? motion->turn_rate : 0;
     if (!jl_vec_within(v, 4, jli_sqrt(JL_LARGE)))
         return JL_ENONFINITE;
-    if (v[0] < 0 || v[1] <= 0)
-        return JL_ERANGE;
+    if (v[0] < 0 || v[1] <= 0 || v[1] * v[1] < JL_REAL_MIN)
+        return JL_ERANGE;               /* R must not underflow */
     g = (dt > 2 ? dt * dt / 2 : 2) * v[0];
     if (!jl_vec_within(&g, 1, JL_LARGE))
         return JL_ENONFINITE;
@@ -133,7 +133,7 @@ int jl_motion_start(jl_real *x, jl_real *P, const jl_motion *motion,
                     const jl_real *z, jl_real v0_std, jl_real a0_std)
 {
     jl_real std[3];
-    int n = motion->axes * motion->order, a, i;
+    int n, a, i;
 
     std[0] = motion->sigma_z;
     std[1] = v0_std;
@@ -145,6 +145,7 @@ int jl_motion_start(jl_real *x, jl_real *P, const jl_motion *motion,
         return JL_ENONFINITE;
     if (std[0] <= 0 || std[1] <= 0 || (motion->order == 3 && std[2] <= 0))
         return JL_ERANGE;
+    n = motion->axes * motion->order;
     memset(x, 0, (size_t)n * sizeof *x);
     memset(P, 0, (size_t)(n * n) * sizeof *P);
     for (a = 0; a < motion->axes; a++) {
