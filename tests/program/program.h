@@ -1,7 +1,8 @@
-/* Running the program: what it says, its exit status, a time limit.  Comes
- * after close.h and scratch.h. */
+/* Running the program: what it says, its exit status, a time limit. */
 #ifndef TESTS_PROGRAM_H
 #define TESTS_PROGRAM_H
+
+#include "scratch.h"
 
 #include <ctype.h>
 #include <dirent.h>

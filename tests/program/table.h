@@ -2,6 +2,10 @@
 #ifndef TESTS_TABLE_H
 #define TESTS_TABLE_H
 
+#include "close.h"
+
+#include <stdlib.h>
+
 struct table {
     char header[4096];
     int rows, columns;

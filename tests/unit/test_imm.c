@@ -1089,6 +1089,65 @@ static void test_imm_underflowed_modes_mix(void **state)
     }
 }
 
+/* Improbable modes that know they are at 1000 stay there exactly: they come
+ * from each other, or only from themselves. */
+static void test_imm_improbable_modes_keep_their_estimate(void **state)
+{
+    static const jl_real chains[2][9] = {
+        { 1, 0, 0, 0, JL_C(0.7), JL_C(0.3), 0, JL_C(0.3), JL_C(0.7) },
+        { 1, 0, 0, JL_C(0.3), JL_C(0.7), 0, JL_C(0.3), 0, JL_C(0.7) }
+    };
+    jl_real z = 0;
+    int run, j, k;
+
+    (void)state;
+    for (run = 0; run < 4; run++) {
+        make(3, 1, 1);
+        for (j = 0; j < 3; j++) {
+            in.F[j][0] = in.H[j][0] = 1;
+            in.G[j][0] = 0;
+            in.R[j][0] = 100;
+            in.x[j] = j == 0 ? 0 : 1000;
+            in.P[j] = j == 0;
+        }
+        memcpy(in.Pi, chains[run / 2], sizeof chains[0]);
+        bind(&rig, &jl_kf_joseph, run % 2);
+        for (k = 1; k <= 20; k++) {
+            assert_int_equal(step(&rig, &z), JL_OK);
+            for (j = 1; j < 3; j++)
+                assert_close(rig.imm.x[j], 1000, 4000 * k * EPS);
+        }
+        assert_true(rig.imm.logmu[1] < -50000);
+    }
+}
+
+/* Probabilities whose sum is 1 only within the tolerance do not move what all
+ * modes agree in. */
+static void test_imm_mu_within_tolerance(void **state)
+{
+    int run, j;
+
+    (void)state;
+    for (run = 0; run < 4; run++) {
+        make(3, 1, 1);
+        if (run / 2)
+            make_sticky(JL_C(0.85));
+        for (j = 0; j < 3; j++) {
+            in.x[j] = 1.0e6f;
+            in.P[j] = 1;
+            in.mu[j] = (1 + JL_C(0.9) * JL_PROB_TOLERANCE) / 3;
+        }
+        bind(&rig, &jl_kf_joseph, run % 2);
+        assert_close(rig.imm.xhat[0], 1.0e6, 8.0e6 * EPS);
+        assert_close(rig.imm.Phat[0], 1, 0.1);
+        assert_int_equal(jl_imm_mix(&rig.imm, spoilt()), JL_OK);
+        for (j = 0; j < 3; j++) {
+            assert_close(rig.imm.xw[j], 1.0e6, 8.0e6 * EPS);
+            assert_close(rig.imm.Pw[j], 1, 0.1);
+        }
+    }
+}
+
 /* Estimates and covariances as large as they may be. */
 static void test_imm_mixing_cannot_overflow(void **state)
 {
@@ -1319,6 +1378,43 @@ static void test_imm_failed_step_leaves_no_trace(void **state)
     }
 }
 
+/* The pieces of a step; mode `bad` does not get through, the others do. */
+static void check_failed_piece(int bad, int code)
+{
+    const jl_real z[Z_MAX] = { 1, 2 };
+    int j, status;
+
+    break_mode(&rig, bad, code);
+    jl_imm_foresee(&rig.imm);
+    for (j = 0; j < 3; j++) {
+        jl_imm_mix_mode(&rig.imm, j, spoilt());
+        status = jl_imm_predict_mode(&rig.imm, j, spoilt());
+        if (status == JL_OK)
+            status = jl_imm_update_mode(&rig.imm, j, z, spoilt());
+        assert_int_equal(status, j == bad ? code : JL_OK);
+    }
+    assert_int_equal(jl_imm_weigh(&rig.imm), JL_EORDER);
+    check_same(&rig.imm, &twin.imm);
+    set_mode(&rig, bad);
+    assert_int_equal(step(&rig, z), JL_OK);
+    assert_int_equal(step(&twin, z), JL_OK);
+    check_same(&rig.imm, &twin.imm);
+}
+
+static void test_imm_failed_piece_bars_weigh(void **state)
+{
+    int j;
+
+    (void)state;
+    make(3, 2, 2);
+    bind(&rig, &jl_kf_joseph, JL_MIX_AUTO);
+    bind(&twin, &jl_kf_joseph, JL_MIX_AUTO);
+    for (j = 0; j < 3; j++) {
+        check_failed_piece(j, JL_ENONFINITE);   /* its prediction */
+        check_failed_piece(j, JL_ESINGULAR);    /* its update */
+    }
+}
+
 /* A new chain or state while a step is under way: that step is over. */
 static void test_imm_change_ends_the_step(void **state)
 {
@@ -1365,10 +1461,13 @@ int main(void)
         cmocka_unit_test(test_imm_evidence),
         cmocka_unit_test(test_imm_underflow_under_jumps),
         cmocka_unit_test(test_imm_underflowed_modes_mix),
+        cmocka_unit_test(test_imm_improbable_modes_keep_their_estimate),
+        cmocka_unit_test(test_imm_mu_within_tolerance),
         cmocka_unit_test(test_imm_mixing_cannot_overflow),
         cmocka_unit_test(test_imm_routes_to_the_same_bits),
         cmocka_unit_test(test_imm_stages_out_of_order),
         cmocka_unit_test(test_imm_failed_step_leaves_no_trace),
+        cmocka_unit_test(test_imm_failed_piece_bars_weigh),
         cmocka_unit_test(test_imm_change_ends_the_step),
     };
 

@@ -586,6 +586,25 @@ static void test_kf_refuses_measurements(void **state)
     }
 }
 
+/* Also where the sensor is so bad that every result would be moderate. */
+static void test_kf_refuses_z_beyond_large(void **state)
+{
+    jl_real z;
+    int f;
+
+    (void)state;
+    for (f = 0; f < 2; f++) {
+        make_scalar(&rig, forms[f], 1, 0, JL_LARGE, 0, 1);
+        for (z = -2 * JL_LARGE; z <= 2 * JL_LARGE; z += 4 * JL_LARGE) {
+            assert_int_equal(call(UPDATE, &z), JL_ENONFINITE);
+            assert_int_equal(call(STEP, &z), JL_ENONFINITE);
+        }
+        z = JL_LARGE;
+        assert_int_equal(call(STEP, &z), JL_OK);
+        assert_close(rig.kf.x[0], 1, 8 * EPS);
+    }
+}
+
 /* A form that fails may have written its outputs, but nothing else. */
 static void test_kf_form_fails_alone(void **state)
 {
@@ -677,6 +696,7 @@ int main(void)
         cmocka_unit_test(test_kf_missing_measurement),
         cmocka_unit_test(test_kf_outlier),
         cmocka_unit_test(test_kf_refuses_measurements),
+        cmocka_unit_test(test_kf_refuses_z_beyond_large),
         cmocka_unit_test(test_kf_form_fails_alone),
         cmocka_unit_test(test_kf_singular),
         cmocka_unit_test(test_kf_blow_up),

@@ -395,7 +395,7 @@ static void test_motion_closed_forms(void **state)
         check_motion(JL_MOTION_CT, 2, 2, dts[k]);
         check_motion(JL_MOTION_CT, 2, 3, dts[k]);
     }
-    check_motion(JL_MOTION_CV, MAX / 3, 2, 1);
+    check_motion(JL_MOTION_CV, MAX / 2, 2, 1);
     check_motion(JL_MOTION_CA, MAX / 3, 3, 1);
 }
 
@@ -547,6 +547,9 @@ static void test_motion_refuses_sizes(void **state)
     assert_int_equal(bent_status(JL_MOTION_CV, 1, 2), JL_EDIM);
     assert_int_equal(bent_status(JL_MOTION_CV, 0, 2), JL_EDIM);
     assert_int_equal(bent_status(JL_MOTION_CV, -2, -2), JL_EDIM);
+    assert_int_equal(bent_status(JL_MOTION_CV, INT_MAX, 2), JL_EDIM);
+    assert_int_equal(bent_status(JL_MOTION_CV, INT_MIN, 2), JL_EDIM);
+    assert_int_equal(bent_status(JL_MOTION_CV, 2, INT_MAX), JL_EDIM);
     assert_int_equal(bent_status(JL_MOTION_CA, 2, 2), JL_EDIM);
     for (n = 1; n <= 3; n += 2) {       /* turns are of two axes */
         make(&rig, 2 * n, n, n);
@@ -589,6 +592,7 @@ static void test_motion_refuses_numbers(void **state)
     assert_int_equal(number_status(0, 0), JL_OK);
     assert_int_equal(number_status(2, 0), JL_ERANGE);
     assert_int_equal(number_status(2, -1), JL_ERANGE);
+    assert_int_equal(number_status(2, JL_REAL_MIN), JL_ERANGE); /* R = 0 */
     assert_int_equal(number_status(1, 1024), JL_OK);
     assert_int_equal(number_status(1, 1024 + 4096 * JL_EPSILON), JL_ERANGE);
     assert_int_equal(number_status(1, -1024 - 4096 * JL_EPSILON), JL_ERANGE);
@@ -671,7 +675,11 @@ static void test_start_refuses(void **state)
     assert_int_equal(start_status(&motion, z, 1, 1), JL_EDIM);
     motion = motion_of(JL_MOTION_CV, 0, 2, 0);
     assert_int_equal(start_status(&motion, z, 1, 1), JL_EDIM);
-    motion = motion_of(JL_MOTION_CV, MAX + 1, 2, 0);
+    motion = motion_of(JL_MOTION_CV, MAX / 2 + 1, 2, 0);
+    assert_int_equal(start_status(&motion, z, 1, 1), JL_EDIM);
+    motion = motion_of(JL_MOTION_CV, INT_MAX, 2, 0);
+    assert_int_equal(start_status(&motion, z, 1, 1), JL_EDIM);
+    motion = motion_of(JL_MOTION_CV, INT_MAX / 3 * 2 + 2, 3, 0);
     assert_int_equal(start_status(&motion, z, 1, 1), JL_EDIM);
     motion = motion_of(JL_MOTION_CT, 1, 2, 0);
     assert_int_equal(start_status(&motion, z, 1, 1), JL_EDIM);
