@@ -1121,8 +1121,26 @@ static void test_imm_improbable_modes_keep_their_estimate(void **state)
     }
 }
 
-/* Probabilities whose sum is 1 only within the tolerance do not move what all
- * modes agree in. */
+/* What all modes agree in, neither combining nor mixing moves. */
+static void check_agreed(int mixing)
+{
+    int j;
+
+    for (j = 0; j < in.M; j++) {
+        in.x[j] = 1.0e6f;
+        in.P[j] = 1;
+    }
+    bind(&rig, &jl_kf_joseph, mixing);
+    assert_close(rig.imm.xhat[0], 1.0e6, 8.0e6 * EPS);
+    assert_close(rig.imm.Phat[0], 1, 0.1);
+    assert_int_equal(jl_imm_mix(&rig.imm, spoilt()), JL_OK);
+    for (j = 0; j < in.M; j++) {
+        assert_close(rig.imm.xw[j], 1.0e6, 8.0e6 * EPS);
+        assert_close(rig.imm.Pw[j], 1, 0.1);
+    }
+}
+
+/* ... nor where the sum of mu is 1 only within the tolerance, */
 static void test_imm_mu_within_tolerance(void **state)
 {
     int run, j;
@@ -1132,19 +1150,27 @@ static void test_imm_mu_within_tolerance(void **state)
         make(3, 1, 1);
         if (run / 2)
             make_sticky(JL_C(0.85));
-        for (j = 0; j < 3; j++) {
-            in.x[j] = 1.0e6f;
-            in.P[j] = 1;
+        for (j = 0; j < 3; j++)
             in.mu[j] = (1 + JL_C(0.9) * JL_PROB_TOLERANCE) / 3;
-        }
-        bind(&rig, &jl_kf_joseph, run % 2);
-        assert_close(rig.imm.xhat[0], 1.0e6, 8.0e6 * EPS);
-        assert_close(rig.imm.Phat[0], 1, 0.1);
-        assert_int_equal(jl_imm_mix(&rig.imm, spoilt()), JL_OK);
-        for (j = 0; j < 3; j++) {
-            assert_close(rig.imm.xw[j], 1.0e6, 8.0e6 * EPS);
-            assert_close(rig.imm.Pw[j], 1, 0.1);
-        }
+        check_agreed(run % 2);
+    }
+}
+
+/* nor where a mode, and jumps to it, are as improbable as can be. */
+static void test_imm_mode_that_is_hardly_entered(void **state)
+{
+    int run;
+
+    (void)state;
+    for (run = 0; run < 200; run++) {
+        make(2, 1, 1);
+        in.Pi[0] = 1;
+        in.Pi[1] = JL_REAL_MIN * (2 + rnd());
+        in.Pi[2] = in.Pi[3] = JL_C(0.5);
+        in.mu[0] = 1;
+        in.mu[1] = JL_REAL_MIN * (4 + rnd());
+        check_agreed(run % 2);
+        assert_int_equal(rig.imm.sticky, run % 2 == JL_MIX_AUTO);
     }
 }
 
@@ -1463,6 +1489,7 @@ int main(void)
         cmocka_unit_test(test_imm_underflowed_modes_mix),
         cmocka_unit_test(test_imm_improbable_modes_keep_their_estimate),
         cmocka_unit_test(test_imm_mu_within_tolerance),
+        cmocka_unit_test(test_imm_mode_that_is_hardly_entered),
         cmocka_unit_test(test_imm_mixing_cannot_overflow),
         cmocka_unit_test(test_imm_routes_to_the_same_bits),
         cmocka_unit_test(test_imm_stages_out_of_order),
