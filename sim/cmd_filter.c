@@ -17,7 +17,8 @@ static const char help[] =
     "                    serial)\n"
     "  --port lcm|loop   ... that are processes and talk over LCM (default\n"
     "                    with --pes), or threads that take turns\n"
-    PORT_HELP;
+    PORT_HELP
+    HELP_HELP;
 
 int cmd_filter(int argc, char **argv)
 {
@@ -26,12 +27,12 @@ int cmd_filter(int argc, char **argv)
     int c, status;
 
     options_init(&options, "filter");
-    while ((c = getopt_long(argc, argv, "o:h", known, NULL)) != -1) {
+    while ((c = getopt_long(argc, argv, SHORT_OPTIONS, known, NULL)) != -1) {
         if (c == 'h') {
             fputs(help, stdout);
             return 0;
         }
-        status = options_take(&options, c, optarg);
+        status = options_take(&options, c, argv);
         if (status != 0)
             return status;
     }

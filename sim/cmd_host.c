@@ -15,7 +15,8 @@ static const char help[] =
     "  --timeout S       longest wait for an answer (default 2)\n"
     RUN_HELP
     COMMON_HELP
-    DATA_HELP;
+    DATA_HELP
+    HELP_HELP;
 
 int cmd_host(int argc, char **argv)
 {
@@ -25,13 +26,14 @@ int cmd_host(int argc, char **argv)
 
     options_init(&options, "host");
     options.run = "jumplink";
+    options.start_us = 60000000;
     options.port = PORT_BY_HAND;
-    while ((c = getopt_long(argc, argv, "o:h", known, NULL)) != -1) {
+    while ((c = getopt_long(argc, argv, SHORT_OPTIONS, known, NULL)) != -1) {
         if (c == 'h') {
             fputs(help, stdout);
             return 0;
         }
-        status = options_take(&options, c, optarg);
+        status = options_take(&options, c, argv);
         if (status != 0)
             return status;
     }

@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "command.h"
-#include "complain.h"
 #include "lcm_net.h"
 #include "run.h"
 
@@ -11,14 +10,15 @@ static const char help[] =
     "usage: jumplink pe --pe I --pes P --model MODEL.json --lcm-url URL\n"
     "One PE of a run on several machines: the same model, filter and\n"
     "form on all PEs and on the host (jumplink host), which must be\n"
-    "started too, in any order.  Ends when the host ends; prints what it\n"
-    "sent.\n\n"
+    "started too, in any order.  Ends when the host ends the run, and\n"
+    "prints what it sent; if the host dies, end it by hand.\n\n"
     "  --pe I            which PE this is, from 0; PE 0 talks to the host\n"
     "  --pes P           how many there are\n"
     "  --model MODEL.json  the model\n"
     "  --timeout S       longest wait for another PE in a step (default 2)\n"
     RUN_HELP
-    COMMON_HELP;
+    COMMON_HELP
+    HELP_HELP;
 
 static int serve(int pe, const struct model *model,
                  const struct options *options)
@@ -32,14 +32,11 @@ static int serve(int pe, const struct model *model,
         return 1;
     status = run_pe(pe, model, options, node.to, node.from);
     lcm_node_traffic(&node, &traffic);
-    lcm_node_close(&node);
-    if (status != JL_OK) {
-        char name[16];
-
-        snprintf(name, sizeof name, "PE%d", pe);
-        complain(name, 0, NULL, "%s", jl_status_text(status));
+    if (status != JL_OK)
+        lcm_node_hint(&node);
+    lcm_node_close(&node, status == JL_OK);
+    if (status != JL_OK)
         return 1;
-    }
     printf("pe %d of %d: %lu messages, %lu octets, %lu sent again\n", pe,
            options->pes, traffic.messages, traffic.octets, traffic.resent);
     return 0;
@@ -60,7 +57,8 @@ int cmd_pe(int argc, char **argv)
 
     options_init(&options, "pe");
     options.run = "jumplink";
-    while ((c = getopt_long(argc, argv, "h", known, NULL)) != -1) {
+    options.start_us = 60000000;
+    while ((c = getopt_long(argc, argv, SHORT_OPTIONS, known, NULL)) != -1) {
         if (c == 'h') {
             fputs(help, stdout);
             return 0;
@@ -70,7 +68,7 @@ int cmd_pe(int argc, char **argv)
         else if (c == 'm')
             path = optarg;
         else
-            status = options_take(&options, c, optarg);
+            status = options_take(&options, c, argv);
         if (status != 0)
             return status;
     }

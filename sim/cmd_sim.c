@@ -35,7 +35,21 @@ static const char help[] =
     "  --z A,B           columns of the position (default\n"
     "                    east_m,north_m)\n"
     "  --time NAME       column of the time (default t_s, else k)\n"
-    PORT_HELP;
+    PORT_HELP
+    HELP_HELP;
+
+static int is_folder(const char *path)
+{
+    int error = errno;
+    struct stat is;
+
+    if (stat(path, &is) == 0) {
+        errno = ENOTDIR;
+        return S_ISDIR(is.st_mode);
+    }
+    errno = error;
+    return 0;
+}
 
 /* mkdir -p */
 static int make_folder(const char *path)
@@ -47,8 +61,9 @@ static int make_folder(const char *path)
         p = strchr(p + 1, '/');
         if (p != NULL)
             *p = '\0';
-        if (mkdir(copy, 0777) != 0 && errno != EEXIST)
-            status = complain(copy, 0, NULL, "%s", strerror(errno));
+        if (mkdir(copy, 0777) != 0 && !is_folder(copy))
+            status = complain(copy, 0, NULL, "cannot create the folder: %s",
+                              strerror(errno));
         if (p != NULL)
             *p = '/';
     }
@@ -109,6 +124,24 @@ static int all_runs(struct flight_report *report, struct model *models,
     return status;
 }
 
+/* Files are named after the models. */
+static int has_twin(const struct model *models, int i)
+{
+    char name[64], other[64];
+    int j;
+
+    flight_model_name(name, sizeof name, &models[i]);
+    for (j = 0; j < i; j++) {
+        flight_model_name(other, sizeof other, &models[j]);
+        if (strcmp(name, other) == 0) {
+            misuse("sim", "--model %s: another model is also named %s",
+                   models[i].path, name);
+            return 1;
+        }
+    }
+    return 0;
+}
+
 static int sim(const char *data_path, const char *const *paths, int count,
                struct options *options)
 {
@@ -129,7 +162,8 @@ static int sim(const char *data_path, const char *const *paths, int count,
         else {
             read++;
             status = run_pick_mode(&models[i], options);
-            if (status == 0 && flight_fits(&models[i]) != 0)
+            if (status == 0 && (flight_fits(&models[i]) != 0
+                                || has_twin(models, i)))
                 status = 2;
         }
     if (status == 0)
@@ -166,7 +200,7 @@ int cmd_sim(int argc, char **argv)
     options.port = PORT_LCM;
     options.pes = 4;
     options.out = "build/sim";
-    while ((c = getopt_long(argc, argv, "o:h", known, NULL)) != -1) {
+    while ((c = getopt_long(argc, argv, SHORT_OPTIONS, known, NULL)) != -1) {
         if (c == 'h') {
             fputs(help, stdout);
             return 0;
@@ -178,7 +212,7 @@ int cmd_sim(int argc, char **argv)
         else if (c == 'm')
             return misuse("sim", "at most %d times --model", MODELS_MAX);
         else
-            status = options_take(&options, c, optarg);
+            status = options_take(&options, c, argv);
         if (status != 0)
             return status;
     }

@@ -101,8 +101,8 @@ static void put(FILE *out, jl_real v)
         fprintf(out, ",%.17g", (double)v);
 }
 
-int estimates_write(const struct estimates *e, const struct data_file *data,
-                    FILE *out)
+void estimates_write(const struct estimates *e, const struct data_file *data,
+                     FILE *out)
 {
     int n = e->n, a, b;
     long row;
@@ -130,5 +130,4 @@ int estimates_write(const struct estimates *e, const struct data_file *data,
         put(out, e->loglik[row]);
         fputc('\n', out);
     }
-    return ferror(out) ? -1 : 0;
 }

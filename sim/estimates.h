@@ -30,9 +30,8 @@ int estimates_same(const struct estimates *a, const struct estimates *b);
 long estimates_times(const struct estimates *e, double *median_us,
                      double *p99_us);
 
-/* As CSV: time (and run), x, P upper triangle, mu, loglik.
- * Returns 0, or -1 if a write failed. */
-int estimates_write(const struct estimates *e, const struct data_file *data,
-                    FILE *out);
+/* As CSV: time (and run), x, P upper triangle, mu, loglik. */
+void estimates_write(const struct estimates *e, const struct data_file *data,
+                     FILE *out);
 
 #endif

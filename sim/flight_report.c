@@ -40,15 +40,19 @@ void flight_report_close(struct flight_report *report)
     free(report->runs);
 }
 
-void flight_run_name(struct flight_run *run, const struct model *model,
-                     enum hold hold)
+void flight_model_name(char *name, int size, const struct model *model)
 {
     const char *base = strrchr(model->path, '/');
 
     base = base == NULL ? model->path : base + 1;
+    snprintf(name, (size_t)size, "%.*s", (int)strcspn(base, "."), base);
+}
+
+void flight_run_name(struct flight_run *run, const struct model *model,
+                     enum hold hold)
+{
     run->source = model;
-    snprintf(run->model, sizeof run->model, "%.*s",
-             (int)strcspn(base, "."), base);
+    flight_model_name(run->model, sizeof run->model, model);
     strcpy(run->positions, hold == HOLD_NONE ? "fresh" : "recognised");
     snprintf(run->name, sizeof run->name, "%s_%s", run->model,
              run->positions);
@@ -105,7 +109,8 @@ static int write_estimates(const struct flight_report *r,
 
     if (open_in(&out, folder, run->name, ".csv") != 0)
         return -1;
-    return out_close(&out, estimates_write(&run->e, r->data, out.stream) == 0);
+    estimates_write(&run->e, r->data, out.stream);
+    return out_close(&out, 1);
 }
 
 /* Time, what was measured, whether the row repeats the one before, and the

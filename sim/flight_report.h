@@ -34,6 +34,9 @@ int flight_report_open(struct flight_report *report,
                        const struct options *options, int most);
 void flight_report_close(struct flight_report *report);
 
+/* The name of a model: its file's without folder and ending. */
+void flight_model_name(char *name, int size, const struct model *model);
+
 /* Name a run after its model and its way with held positions. */
 void flight_run_name(struct flight_run *run, const struct model *model,
                      enum hold hold);

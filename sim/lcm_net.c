@@ -10,7 +10,9 @@
 #include "jumplink/wire.h"
 #include "private_net.h"
 
-#define LINGER_US 1000000L
+/* How long to go on until everything sent has arrived. */
+#define WELL_US 5000000L
+#define FAILED_US 200000L
 
 const char *lcm_net_url(const struct options *options)
 {
@@ -23,12 +25,13 @@ const char *lcm_net_url(const struct options *options)
     if (private_net_enter() == 0) {
         strcpy(url, "udpm://239.255.76.67:7667?ttl=0");
     } else {
-        int why = errno;
+        int why = errno;        /* ENOSPC: of namespaces, not of a disk */
 
         private_net_shared_url(url, sizeof url, (unsigned)getpid()
                                * 2654435761u + (unsigned)clock_us());
         fprintf(stderr, "jumplink: no private network is allowed here (%s): "
-                "using the machine's own, %s\n", strerror(why), url);
+                "using the machine's own, %s\n", why == ENOSPC
+                ? "limit of namespaces" : strerror(why), url);
     }
     return url;
 }
@@ -76,8 +79,18 @@ void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic)
     traffic->resent += jl_lcm_count(node->lcm).resent;
 }
 
-void lcm_node_close(struct lcm_node *node)
+void lcm_node_hint(const struct lcm_node *node)
 {
-    jl_lcm_close(node->lcm, LINGER_US);
+    unsigned long refused = jl_lcm_count(node->lcm).refused;
+
+    if (refused > 0)
+        complain("LCM", 0, NULL, "%lu datagrams were refused: is a PE built "
+                 "for another type of number, or a stranger on this address?",
+                 refused);
+}
+
+void lcm_node_close(struct lcm_node *node, int well)
+{
+    jl_lcm_close(node->lcm, well ? WELL_US : FAILED_US);
     memset(node, 0, sizeof *node);
 }

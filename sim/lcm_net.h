@@ -28,7 +28,11 @@ int lcm_node_open(struct lcm_node *node, int which, const char *url,
 /* What this node sent. */
 void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic);
 
-/* Leave, when all that was sent has arrived or a second has passed. */
-void lcm_node_close(struct lcm_node *node);
+/* After a failure: if datagrams were refused, a line that says what that may
+ * mean. */
+void lcm_node_hint(const struct lcm_node *node);
+
+/* Leave: when all that was sent has arrived, if all is well; else soon. */
+void lcm_node_close(struct lcm_node *node, int well);
 
 #endif

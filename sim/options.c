@@ -29,6 +29,8 @@ void options_init(struct options *options, const char *command)
     options->mode = -1;
     options->form = &jl_kf_joseph;
     options->timeout_us = 2000000;
+    options->start_us = 10000000;
+    opterr = 0;                         /* options_take says it in one line */
 }
 
 int option_long(long *number, const char *command, const char *option,
@@ -74,8 +76,25 @@ static int choose(const char *command, const char *option, const char *value,
     return -1;
 }
 
-int options_take(struct options *o, int c, const char *value)
+static int is_run_name(const char *name)
 {
+    size_t n = strspn(name, "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                      "abcdefghijklmnopqrstuvwxyz0123456789_");
+
+    return name[n] == '\0' && n >= 1 && n <= 16;
+}
+
+static int take_word(const char **to, const char *command, const char *option,
+                     const char *value)
+{
+    *to = value;
+    return value[0] != '\0' ? 0
+        : misuse(command, "--%s: must not be empty", option);
+}
+
+int options_take(struct options *o, int c, char *const *argv)
+{
+    const char *value = optarg;
     static const char *const filters[] = { "imm", "kf", NULL };
     static const char *const forms[] = { "joseph", "standard", NULL };
     static const char *const holds[] = { "none", "detect", "column", NULL };
@@ -114,20 +133,25 @@ int options_take(struct options *o, int c, const char *value)
         return option_seconds(&o->timeout_us, o->command, "timeout", value);
     case 1008:
         o->lcm_url = value;
-        return 0;
+        return strncmp(value, "udpm://", 7) == 0 ? 0
+            : misuse(o->command, "--lcm-url %s: must be udpm://ADDRESS:PORT"
+                     "?ttl=N", value);
     case 1009:
         o->run = value;
-        return 0;
+        return is_run_name(value) ? 0
+            : misuse(o->command, "--run '%s': must be 1 to 16 letters, digits "
+                     "or _", value);
     case 1010:
-        o->z = value;
-        return 0;
+        return take_word(&o->z, o->command, "z", value);
     case 1011:
-        o->time = value;
-        return 0;
+        return take_word(&o->time, o->command, "time", value);
+    case 1012:
+        return option_seconds(&o->start_us, o->command, "start", value);
     case 'o':
-        o->out = value;
-        return 0;
-    default:                            /* getopt has said what is wrong */
-        return misuse(o->command, "wrong use");
+        return take_word(&o->out, o->command, "out", value);
+    case ':':
+        return misuse(o->command, "%s needs a value", argv[optind - 1]);
+    default:
+        return misuse(o->command, "unknown option %s", argv[optind - 1]);
     }
 }

@@ -25,6 +25,7 @@ struct options {
     enum port port;             /* PORT_NONE: serial                        */
     int pes;
     long timeout_us;            /* of each answer in a parallel run         */
+    long start_us;              /* for all to be there at its start         */
     const char *lcm_url;        /* NULL: a private network                  */
     const char *run;            /* name of an LCM run, or NULL              */
     const char *z, *time;       /* columns of the data                      */
@@ -45,6 +46,7 @@ struct options {
     { "run", required_argument, NULL, 1009 }, \
     { "z", required_argument, NULL, 1010 }, \
     { "time", required_argument, NULL, 1011 }, \
+    { "start", required_argument, NULL, 1012 }, \
     { "out", required_argument, NULL, 'o' }, \
     { "help", no_argument, NULL, 'h' }
 
@@ -60,21 +62,29 @@ struct options {
     "                    if there is one, else none)\n" \
     "  --z A,B,..        columns of the measurement (default z0,z1,..)\n" \
     "  --time NAME       column of the time (default t_s, else k)\n"
+#define HELP_HELP \
+    "  -h, --help        this text\n"
 #define PORT_HELP \
     "  --timeout S       longest wait for an answer (default 2)\n" \
     "  --lcm-url URL     LCM address, on the network as it is (default: a\n" \
     "                    private network for this run)\n"
 #define RUN_HELP \
-    "  --run NAME        name of the run, if several share a network\n" \
-    "                    (default jumplink)\n" \
+    "  --run NAME        name of the run, if several share a network: 1 to\n" \
+    "                    16 letters, digits or _ (default jumplink)\n" \
+    "  --start S         longest wait for the others to start (default 60)\n" \
     "  --lcm-url URL     LCM address, such as\n" \
     "                    udpm://239.255.76.67:7667?ttl=1\n"
 
 void options_init(struct options *options, const char *command);
 
-/* Take the option `c` of the common ones with its value.
+/* getopt_long's short options: those of COMMON_OPTIONS, and no words of its
+ * own about wrong ones. */
+#define SHORT_OPTIONS ":o:h"
+
+/* Take the option `c` of the common ones, whose value is in optarg; anything
+ * that getopt_long does not know is refused here.
  * Returns 0, or 2 (the exit status) after a message. */
-int options_take(struct options *options, int c, const char *value);
+int options_take(struct options *options, int c, char *const *argv);
 
 /* A whole number, or seconds, out of an option's value, within [low, high].
  * Return 0, or 2 after a message that names the option. */

@@ -2,6 +2,7 @@
 #include "run.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -60,10 +61,22 @@ jl_u32 run_fingerprint(const struct model *model,
     return jl_crc32(model->fingerprint, more, sizeof more);
 }
 
-static int failed_at(const struct data_file *data, long row, int status)
+int run_is_channels(int status)
 {
-    complain(data->path, data->line[row], NULL, "the step fails: %s",
-             jl_status_text(status));
+    return status <= JL_ETIMEOUT;
+}
+
+int run_failed(const struct data_file *data, long row, int status)
+{
+    if (row < 0)
+        complain("PEs", 0, NULL, "the run does not start: %s",
+                 jl_status_text(status));
+    else if (run_is_channels(status))
+        complain("PEs", 0, NULL, "the run ends at %s:%ld: %s", data->path,
+                 data->line[row], jl_status_text(status));
+    else
+        complain(data->path, data->line[row], NULL, "the step fails: %s",
+                 jl_status_text(status));
     return 1;
 }
 
@@ -115,10 +128,26 @@ int run_serial(struct estimates *e, const struct model *model,
         progress(row + 1, data->rows);
     }
     bank_close(&bank);
-    return status == JL_OK ? 0 : failed_at(data, row - 1, status);
+    return status == JL_OK ? 0 : run_failed(data, row - 1, status);
 }
 
 /* --- a PE ---------------------------------------------------------------- */
+
+/* "PE0: no word from PE2: nothing happened before the deadline" */
+static void pe_failed(int pe, const jl_par *par, int status)
+{
+    char name[16], other[16] = "the host";
+
+    snprintf(name, sizeof name, "PE%d", pe);
+    if (par->failed == JL_OK) {
+        complain(name, 0, NULL, "%s", jl_status_text(status));
+        return;
+    }
+    if (par->failed_pe < par->config.npe)
+        snprintf(other, sizeof other, "PE%d", par->failed_pe);
+    complain(name, 0, NULL, "%s %s: %s", par->failed == JL_EMODEL
+             ? "not like" : "no word from", other, jl_status_text(status));
+}
 
 int run_pe(int pe, const struct model *model, const struct options *options,
            jl_chan **to, jl_chan **from)
@@ -148,11 +177,14 @@ int run_pe(int pe, const struct model *model, const struct options *options,
         config.prepare = bank_prepare;
         config.context = &bank;
         config.fingerprint = run_fingerprint(model, options);
+        config.start_us = options->start_us;
         config.timeout_us = options->timeout_us;
         status = jl_par_init(&par, &bank.imm, &config, buf, cap, mode_status,
                              z);
         if (status == JL_OK)
             status = jl_par_serve(&par, bank.scratch);
+        if (status != JL_OK)
+            pe_failed(pe, &par, status);
         bank_close(&bank);
     }
     free(owner);
@@ -210,7 +242,36 @@ static int host_row(struct estimates *e, long row,
     return status;
 }
 
-int run_host(struct estimates *e, const struct run_host *host,
+/* The answer to a measurement may come as late as a PE's own deadline. */
+static long answer_us(const struct options *options)
+{
+    return options->timeout_us + 1000000;
+}
+
+static int host_rows(struct estimates *e, long *row,
+                     const struct run_host *host, const struct model *model,
+                     const struct data_file *data,
+                     const struct options *options, jl_estimate *estimate,
+                     unsigned char *buf, int cap)
+{
+    struct feed feed;
+    jl_meas meas;
+    int status = JL_OK;
+
+    if (feed_open(&feed, data, model, options) != 0)
+        return JL_EDIM;
+    for (*row = 0; *row < data->rows; ++*row) {
+        if (feed_meas(&feed, *row, &meas))
+            status = host_row(e, *row, host, &meas, estimate, model, buf, cap,
+                              answer_us(options));
+        if (status != JL_OK)
+            return status;
+        progress(*row + 1, data->rows);
+    }
+    return JL_OK;
+}
+
+int run_host(struct estimates *e, long *row, const struct run_host *host,
              const struct model *model, const struct data_file *data,
              const struct options *options)
 {
@@ -218,43 +279,27 @@ int run_host(struct estimates *e, const struct run_host *host,
     unsigned char *buf = malloc((size_t)cap);
     jl_real *mem = calloc((size_t)(n + n * n + model->M), sizeof *mem);
     jl_estimate estimate;
-    struct feed feed;
-    long row = 0;
 
+    *row = -1;
     if (buf == NULL || mem == NULL) {
         free(buf);
         free(mem);
-        complain(model->path, 0, NULL, "no memory for its messages");
-        return 1;
+        return JL_ENOMEM;
     }
     memset(&estimate, 0, sizeof estimate);
     estimate.x = mem;
     estimate.P = mem + n;
     estimate.mu = estimate.P + n * n;
-    /* Starting may take longer than a step. */
     status = receive(host, NULL, run_fingerprint(model, options), model, buf,
-                     cap, options->timeout_us + 10000000);
-    if (status != JL_OK) {
-        complain("PEs", 0, NULL, "the run does not start: %s",
-                 jl_status_text(status));
-    } else if (feed_open(&feed, data, model, options) == 0) {
-        for (row = 0; row < data->rows && status == JL_OK; row++) {
-            jl_meas meas;
-
-            if (feed_meas(&feed, row, &meas))
-                status = host_row(e, row, host, &meas, &estimate, model, buf,
-                                  cap, options->timeout_us);
-            progress(row + 1, data->rows);
-        }
-        if (status != JL_OK)
-            (void)failed_at(data, row - 1, status);
-    } else {
-        status = JL_EDIM;
-    }
-    (void)jl_host_stop(host->to, buf, cap, options->timeout_us);
+                     cap, options->start_us + 1000000);
+    if (status == JL_OK)
+        status = host_rows(e, row, host, model, data, options, &estimate, buf,
+                           cap);
+    if (status == JL_OK || !run_is_channels(status))
+        (void)jl_host_stop(host->to, buf, cap, options->timeout_us);
     free(buf);
     free(mem);
-    return status == JL_OK ? 0 : 1;
+    return status;
 }
 
 /* --- any ----------------------------------------------------------------- */
@@ -263,7 +308,11 @@ int run(struct estimates *e, struct traffic *traffic,
         const struct model *model, const struct data_file *data,
         const struct options *options)
 {
+    struct feed feed;
+
     memset(traffic, 0, sizeof *traffic);
+    if (feed_open(&feed, data, model, options) != 0)
+        return 2;                       /* before anybody is started */
     switch (options->port) {
     case PORT_LOOP:
         return run_loop(e, traffic, model, data, options);

@@ -45,20 +45,29 @@ jl_u32 run_fingerprint(const struct model *model,
 int run_max_len(const struct model *model);
 
 /* PE pe's part, until the host says stop; to and from have options->pes + 1
- * entries, of which the last is the host's.  Returns a code of base.h. */
+ * entries, of which the last is the host's.  Returns a code of base.h, and if
+ * a channel failed, after a line that says whose. */
 int run_pe(int pe, const struct model *model, const struct options *options,
            jl_chan **to, jl_chan **from);
 
-/* The host's part.  When an answer does not come in time, `alive` (may be
- * NULL) is asked why: it may print a line and return 0 to end the run. */
+/* The host's part. */
 struct run_host {
     jl_chan *to, *from;
-    int (*alive)(void *context);
-    void *context;
+    int (*alive)(void *context);        /* asked now and then, or NULL: 0 ends */
+    void *context;                      /* the run                             */
 };
-int run_host(struct estimates *e, const struct run_host *host,
+
+/* Returns JL_OK; or, with a step that failed in *row, its code; or the error of
+ * a channel, with the row it happened at, or -1: at the start. */
+int run_host(struct estimates *e, long *row, const struct run_host *host,
              const struct model *model, const struct data_file *data,
              const struct options *options);
+
+/* Say in one line why run_host or a serial step failed.  Returns 1. */
+int run_failed(const struct data_file *data, long row, int status);
+
+/* 1 if the status comes from a channel and not from the filter. */
+int run_is_channels(int status);
 
 /* The model with only the mode that the kf of options works on.
  * Returns 0, or 2 after a message. */

@@ -1,5 +1,7 @@
 #include "run_file.h"
 
+#include <sys/stat.h>
+
 #include "out_file.h"
 #include "progress.h"
 #include "run.h"
@@ -11,8 +13,19 @@ static int write_estimates(const struct estimates *e,
 
     if (out_open(&out, path) != 0)
         return 1;
-    return out_close(&out, estimates_write(e, data, out.stream) == 0) == 0
-        ? 0 : 1;
+    estimates_write(e, data, out.stream);
+    return out_close(&out, 1) == 0 ? 0 : 1;
+}
+
+/* Better known before a long run.  What is not a file is not opened twice. */
+static int can_write(const char *path)
+{
+    struct out_file out;
+    struct stat is;
+
+    if (path == NULL || (stat(path, &is) == 0 && !S_ISREG(is.st_mode)))
+        return 1;
+    return out_open(&out, path) == 0 && out_close(&out, 0) == 0;
 }
 
 static int run_data(const struct model *model, const struct data_file *data,
@@ -22,6 +35,8 @@ static int run_data(const struct model *model, const struct data_file *data,
     struct traffic traffic;
     int status;
 
+    if (!can_write(options->out))
+        return 1;
     if (estimates_open(&e, data, model) != 0)
         return 1;
     progress_begin(data->path);

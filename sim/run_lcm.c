@@ -14,18 +14,21 @@
 #include "lcm_net.h"
 #include "run.h"
 
-/* How long a PE may take to leave after the end of a run. */
-#define LEAVE_US 3e6
+/* How long PEs may take to leave after the end of a run, and to say what was
+ * wrong after a failure. */
+#define LEAVE_US 10e6
+#define FAIL_US 1e6
 
 struct pe {
     pid_t pid;                  /* 0: not started, or waited for            */
     int status;                 /* of waitpid                               */
-    FILE *words;                /* its standard output                      */
+    FILE *words;                /* what it prints                           */
 };
 
 struct crew {
     int pes;
     struct pe pe[JL_MAX_PES];
+    char complaint[200];        /* the first that a PE printed              */
 };
 
 /* --- starting ------------------------------------------------------------ */
@@ -89,6 +92,7 @@ static int start(struct crew *crew, const char *url, const char *run,
         crew->pe[pe].pid = fork();
         if (crew->pe[pe].pid == 0) {
             dup2(ends[1], STDOUT_FILENO);
+            dup2(ends[1], STDERR_FILENO);
             close(ends[0]);
             close(ends[1]);
             become_pe(pe, url, run, model, options, parent);
@@ -115,55 +119,53 @@ static int ended(struct pe *pe)
     return pe->pid <= 0;
 }
 
-static void tell(int pe, const struct pe *p)
-{
-    if (WIFSIGNALED(p->status))
-        complain("PEs", 0, NULL, "PE%d was ended by signal %d", pe,
-                 WTERMSIG(p->status));
-    else
-        complain("PEs", 0, NULL, "PE%d ended with status %d", pe,
-                 WEXITSTATUS(p->status));
-}
-
 static int crew_alive(void *context)
 {
     struct crew *crew = context;
     int pe;
 
     for (pe = 0; pe < crew->pes; pe++)
-        if (ended(&crew->pe[pe])) {
-            tell(pe, &crew->pe[pe]);
+        if (ended(&crew->pe[pe]))
             return 0;
-        }
     return 1;
 }
 
 /* --- ending -------------------------------------------------------------- */
 
-/* Add up what a PE printed when it left (cmd_pe.c). */
-static int add_words(struct traffic *traffic, FILE *words)
+/* Add up what a PE printed when it left (cmd_pe.c), and keep a complaint.
+ * Returns 1 if it left in order. */
+static int take_words(struct crew *crew, struct pe *pe,
+                      struct traffic *traffic)
 {
+    static const char complains[] = "jumplink: ";
     unsigned long messages, octets, resent;
     char line[200];
-    int found = 0;
+    int left = 0;
 
-    while (fgets(line, sizeof line, words) != NULL)
+    while (fgets(line, sizeof line, pe->words) != NULL) {
+        line[strcspn(line, "\n")] = '\0';
         if (sscanf(line, "pe %*d of %*d: %lu messages, %lu octets, "
                    "%lu sent again", &messages, &octets, &resent) == 3) {
             traffic->messages += messages;
             traffic->octets += octets;
             traffic->resent += resent;
-            found = 1;
+            left = 1;
+        } else if (crew->complaint[0] == '\0'
+                   && strncmp(line, complains, sizeof complains - 1) == 0) {
+            strcpy(crew->complaint, line + sizeof complains - 1);
         }
-    return found;
+    }
+    fclose(pe->words);
+    return left && pe->status == 0;
 }
 
-/* Wait for all PEs; those that do not leave in time are ended.  Returns 0 if
- * all left of their own and reported, else 1 (after a message, if wanted). */
-static int dismiss(struct crew *crew, struct traffic *traffic, int wanted)
+/* Wait for all PEs to leave; end those that do not.  A PE that was ended by a
+ * signal that is not ours is the reason of whatever others complain about.
+ * Returns 0 if all left in order, else 1 with a complaint. */
+static int dismiss(struct crew *crew, struct traffic *traffic, double wait_us)
 {
-    double deadline = clock_us() + (wanted ? LEAVE_US : 0);
-    int pe, status = 0;
+    double deadline = clock_us() + wait_us;
+    int pe, bad = 0;
 
     for (pe = 0; pe < crew->pes; pe++) {
         struct pe *p = &crew->pe[pe];
@@ -174,17 +176,19 @@ static int dismiss(struct crew *crew, struct traffic *traffic, int wanted)
             kill(p->pid, SIGKILL);
             waitpid(p->pid, &p->status, 0);
             p->pid = 0;
-        }
-        if (p->words != NULL) {
-            if ((!add_words(traffic, p->words) || p->status != 0)
-                && wanted) {
-                tell(pe, p);
-                status = 1;
-            }
-            fclose(p->words);
+        } else if (WIFSIGNALED(p->status)) {
+            snprintf(crew->complaint, sizeof crew->complaint,
+                     "PEs: PE%d was ended by signal %d", pe,
+                     WTERMSIG(p->status));
         }
     }
-    return status;
+    for (pe = 0; pe < crew->pes; pe++)
+        if (crew->pe[pe].words != NULL)
+            bad |= !take_words(crew, &crew->pe[pe], traffic);
+    if (bad && crew->complaint[0] == '\0')
+        snprintf(crew->complaint, sizeof crew->complaint,
+                 "PEs: a PE did not leave in order");
+    return bad;
 }
 
 int run_lcm(struct estimates *e, struct traffic *traffic,
@@ -196,31 +200,41 @@ int run_lcm(struct estimates *e, struct traffic *traffic,
     const char *url = lcm_net_url(options);
     struct lcm_node node;
     struct crew crew;
-    int status;
+    long row = -1;
+    int status, bad;
 
     snprintf(run, sizeof run, "r%d_%d", (int)getpid(), ++count);
     fflush(NULL);
-    status = start(&crew, url, run, model, options);
-    if (status == 0)
-        status = lcm_node_open(&node, options->pes, url, run, model, options);
-    if (status == 0) {
+    bad = start(&crew, url, run, model, options) != 0
+        || lcm_node_open(&node, options->pes, url, run, model, options) != 0;
+    if (bad) {
+        (void)dismiss(&crew, traffic, 0);
+        return 1;
+    }
+    {
         struct run_host host = { node.to[0], node.from[0], crew_alive, &crew };
 
-        status = run_host(e, &host, model, data, options);
-        lcm_node_traffic(&node, traffic);
-        lcm_node_close(&node);
+        status = run_host(e, &row, &host, model, data, options);
     }
-    if (dismiss(&crew, traffic, status == 0) != 0)
-        status = 1;
-    return status;
+    lcm_node_traffic(&node, traffic);
+    lcm_node_close(&node, status == JL_OK);
+    bad = dismiss(&crew, traffic, status == JL_OK ? LEAVE_US : FAIL_US);
+    if (status != JL_OK && !run_is_channels(status))
+        return run_failed(data, row, status);
+    if (bad)
+        fprintf(stderr, "jumplink: %s\n", crew.complaint);
+    else if (status != JL_OK)
+        return run_failed(data, row, status);
+    return bad || status != JL_OK;
 }
 
 int run_by_hand(struct estimates *e, struct traffic *traffic,
                 const struct model *model, const struct data_file *data,
                 const struct options *options)
 {
-    struct lcm_node node;
     struct run_host host = { NULL, NULL, NULL, NULL };
+    struct lcm_node node;
+    long row;
     int status;
 
     if (lcm_node_open(&node, options->pes, options->lcm_url, options->run,
@@ -228,8 +242,12 @@ int run_by_hand(struct estimates *e, struct traffic *traffic,
         return 1;
     host.to = node.to[0];
     host.from = node.from[0];
-    status = run_host(e, &host, model, data, options);
+    status = run_host(e, &row, &host, model, data, options);
     lcm_node_traffic(&node, traffic);
-    lcm_node_close(&node);
-    return status;
+    if (status != JL_OK) {
+        (void)run_failed(data, row, status);
+        lcm_node_hint(&node);
+    }
+    lcm_node_close(&node, status == JL_OK);
+    return status == JL_OK ? 0 : 1;
 }

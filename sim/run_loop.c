@@ -30,9 +30,12 @@ static void body(int node, void *context)
         }
     if (node == pes) {
         struct run_host host = { to[0], from[0], NULL, NULL };
+        long row;
+        int status = run_host(job->e, &row, &host, job->model, job->data,
+                              job->options);
 
-        job->status = run_host(job->e, &host, job->model, job->data,
-                               job->options);
+        job->status = status == JL_OK ? 0
+            : run_failed(job->data, row, status);
     } else {
         (void)run_pe(node, job->model, job->options, to, from);
     }

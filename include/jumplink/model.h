@@ -86,7 +86,7 @@ typedef struct jl_motion {
  * record.
  * Returns JL_OK, JL_EDIM (sizes, axes, order, kind), JL_ENONFINITE (a number
  * of the motion or dt above sqrt(JL_LARGE), or a product above JL_LARGE),
- * JL_ERANGE (accel_std < 0, sigma_z^2 not above 0, |turn_rate| dt > 1024),
+ * JL_ERANGE (accel_std < 0, sigma_z^2 < JL_REAL_MIN, |turn_rate| dt > 1024),
  * JL_ETIME (dt < 0); *mode is untouched on error. */
 int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt);
 

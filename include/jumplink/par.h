@@ -106,7 +106,8 @@ typedef struct jl_par_config {
     jl_prepare prepare;         /* or NULL: the model does not change       */
     void *context;
     jl_u32 fingerprint;         /* of the model: equal on all PEs and host  */
-    long timeout_us;            /* of each message of a step; JL_FOREVER    */
+    long start_us;              /* longest wait for the others at the start */
+    long timeout_us;            /* ... and for each message of a step       */
 } jl_par_config;
 
 typedef struct jl_par {
@@ -115,6 +116,7 @@ typedef struct jl_par {
     int active;                 /* PEs that own modes                       */
     int ahead;                  /* own modes are already mixed, predicted   */
     int failed;                 /* JL_OK, or the error of a channel         */
+    int failed_pe;              /* ... to or from this PE; npe: the host    */
     jl_u32 seq;                 /* of the last measurement                  */
     unsigned long steps;        /* measurements used                        */
     unsigned long refused;      /* ... and refused, with their code         */
@@ -135,12 +137,13 @@ void jl_par_deal(unsigned char *owner, int M, int npe);
 int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
                 unsigned char *buf, int cap, int *status, jl_real *z);
 
-/* Serve until the host says stop: say ready, then step after step.  A
+/* Serve until the host says stop: first all PEs tell PE0 that they are ready,
+ * and PE0 tells them and the host that all are; then step after step.  A
  * measurement that cannot be used (not of the model's size, not finite, a
  * number or a time that goes back) is refused: the host is told why.  scratch
  * [JL_IMM_SCRATCH(M, n, m)], for all three calls; `prepare` may use it too.
- * Returns JL_OK after a stop, JL_EMODEL, or the error of the channel that
- * failed. */
+ * Returns JL_OK after a stop, JL_EMODEL (the fingerprints differ), or the error
+ * of the channel that failed: par->failed_pe says whose. */
 int jl_par_serve(jl_par *par, jl_real *scratch);
 
 /* One step, when the measurement is already on every PE and every PE calls

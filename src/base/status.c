@@ -52,7 +52,7 @@ const char *jl_status_text(int status)
     case JL_EMSG:
         return "message that does not belong here";
     case JL_EMODEL:
-        return "PEs were given different models";
+        return "the PEs were given different models, filters or forms";
     default:
         return "unknown status";
     }

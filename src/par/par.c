@@ -62,45 +62,101 @@ int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
     return JL_OK;
 }
 
+/* --- channels, and whose fault it is ------------------------------------- */
+
+static jl_chan *channel(const jl_par *par, int pe, int sending)
+{
+    const jl_par_config *c = &par->config;
+
+    if (pe == c->npe)
+        return sending ? c->to_host : c->from_host;
+    return sending ? c->to[pe] : c->from[pe];
+}
+
+static int fault(jl_par *par, int pe, int status)
+{
+    par->failed = status;
+    par->failed_pe = pe;
+    return status;
+}
+
+/* Send buf [len] to a PE, or to the host (npe). */
+static int send_to(jl_par *par, int pe, int len, long timeout_us)
+{
+    int status = jl_chan_send(channel(par, pe, 1), par->buf, len, timeout_us);
+
+    return status == JL_OK ? JL_OK : fault(par, pe, status);
+}
+
+/* Receive into buf; returns the length, or the channel's error. */
+static int receive_from(jl_par *par, int pe, long timeout_us)
+{
+    int len = jl_chan_recv(channel(par, pe, 0), par->buf, par->cap,
+                           timeout_us);
+
+    return len >= 0 ? len : fault(par, pe, len);
+}
+
 /* --- ready --------------------------------------------------------------- */
 
-/* PE0 hears of every PE and tells the host.  If one has another model, the
- * host hears a fingerprint that is not its own. */
+static int send_ready(jl_par *par, int to, jl_u32 fingerprint)
+{
+    const jl_par_config *config = &par->config;
+    int len = jli_msg_plain(par->buf, JLI_READY, config->pe, config->npe,
+                            fingerprint);
+
+    return send_to(par, to, len, config->start_us);
+}
+
+/* Returns JL_OK, JL_EMODEL, or an error. */
+static int receive_ready(jl_par *par, int from)
+{
+    int len = receive_from(par, from, par->config.start_us);
+
+    if (len < 0)
+        return len;
+    if (len != JLI_MSG_HEADER || par->buf[0] != JLI_READY
+        || par->buf[1] != from)
+        return fault(par, from, JL_EMSG);
+    if ((int)jl_get_u16(par->buf + 2) != par->config.npe
+        || jl_get_u32(par->buf + 4) != par->config.fingerprint)
+        return fault(par, from, JL_EMODEL);
+    return JL_OK;
+}
+
+/* PE0 hears of every PE, then tells every PE and the host.  If one has another
+ * model, they hear a fingerprint that is nobody's. */
 static int gather_ready(jl_par *par)
 {
     const jl_par_config *config = &par->config;
     jl_u32 fingerprint = config->fingerprint;
-    int pe, len, status;
+    int pe, status, odd = 0;
 
     for (pe = 1; pe < config->npe; pe++) {
-        len = jl_chan_recv(config->from[pe], par->buf, par->cap,
-                           config->timeout_us);
-        if (len < 0)
-            return len;
-        if (len != JLI_MSG_HEADER || par->buf[0] != JLI_READY
-            || par->buf[1] != pe
-            || (int)jl_get_u16(par->buf + 2) != config->npe)
-            return JL_EMSG;
-        if (jl_get_u32(par->buf + 4) != config->fingerprint)
-            fingerprint = ~config->fingerprint & 0xFFFFFFFFUL;
+        status = receive_ready(par, pe);
+        if (status == JL_EMODEL)
+            odd = pe;
+        else if (status != JL_OK)
+            return status;
     }
-    len = jli_msg_plain(par->buf, JLI_READY, 0, config->npe, fingerprint);
-    status = jl_chan_send(config->to_host, par->buf, len, config->timeout_us);
-    if (status != JL_OK)
-        return status;
-    return fingerprint == config->fingerprint ? JL_OK : JL_EMODEL;
+    if (odd > 0)
+        fingerprint = ~fingerprint & (jl_u32)0xFFFFFFFFUL;
+    for (pe = config->npe; pe > 0; pe--) {
+        status = send_ready(par, pe, fingerprint);
+        if (status != JL_OK && odd == 0)
+            return status;
+    }
+    return odd > 0 ? fault(par, odd, JL_EMODEL) : JL_OK;
 }
 
 static int ready(jl_par *par)
 {
-    const jl_par_config *config = &par->config;
-    int len;
+    int status;
 
-    if (config->pe == 0)
+    if (par->config.pe == 0)
         return gather_ready(par);
-    len = jli_msg_plain(par->buf, JLI_READY, config->pe, config->npe,
-                        config->fingerprint);
-    return jl_chan_send(config->to[0], par->buf, len, config->timeout_us);
+    status = send_ready(par, 0, par->config.fingerprint);
+    return status == JL_OK ? receive_ready(par, 0) : status;
 }
 
 /* --- serve --------------------------------------------------------------- */
@@ -113,8 +169,7 @@ static int pass_on(jl_par *par, int len, int last)
     if (par->config.pe != 0)
         return JL_OK;
     for (pe = 1; pe < last && status == JL_OK; pe++)
-        status = jl_chan_send(par->config.to[pe], par->buf, len,
-                              par->config.timeout_us);
+        status = send_to(par, pe, len, par->config.timeout_us);
     return status;
 }
 
@@ -141,8 +196,7 @@ static int answer(jl_par *par, jl_u32 seq, int status)
     if (par->config.pe != 0)
         return JL_OK;
     len = jli_msg_estimate(par->buf, par->imm, seq, status);
-    return jl_chan_send(par->config.to_host, par->buf, len,
-                        par->config.timeout_us);
+    return send_to(par, par->config.npe, len, par->config.timeout_us);
 }
 
 /* One measurement, in buf [len]: refused, or a step.  Returns the error of a
@@ -164,8 +218,10 @@ static int serve_meas(jl_par *par, int len, jl_real *scratch)
     status = jl_par_step(par, &meas, scratch);
     par->steps++;
     if (par->failed != JL_OK) {
-        (void)answer(par, meas.seq, par->failed);
-        return par->failed;
+        int pe = par->failed_pe;
+
+        (void)answer(par, meas.seq, status);
+        return fault(par, pe, status);
     }
     status = answer(par, meas.seq, status);
     jl_par_ahead(par, scratch);
@@ -174,12 +230,11 @@ static int serve_meas(jl_par *par, int len, jl_real *scratch)
 
 int jl_par_serve(jl_par *par, jl_real *scratch)
 {
-    jl_chan *from = par->config.pe == 0 ? par->config.from_host
-                                        : par->config.from[0];
+    int from = par->config.pe == 0 ? par->config.npe : 0;
     int status = ready(par), len;
 
     while (status == JL_OK) {
-        len = jl_chan_recv(from, par->buf, par->cap, JL_FOREVER);
+        len = receive_from(par, from, JL_FOREVER);
         if (len < 0)
             return len;
         if (len == JLI_MSG_HEADER && par->buf[0] == JLI_STOP)

@@ -41,18 +41,21 @@ static int receive_modes(jl_par *par, int pe)
     return len < 0 ? len : jli_msg_modes_read(par, pe, in, len);
 }
 
+/* Returns JL_OK, or the error of a channel, also in failed, with failed_pe. */
 static int exchange(jl_par *par)
 {
     const jl_par_config *config = &par->config;
     int n = par->active, rounds = jli_hop_rounds(n), pe = config->pe;
-    int r, other, status = JL_OK;
     int len = jli_msg_modes(par->buf, par);
+    int r, other, status = JL_OK;
 
     for (r = 0; r < rounds && status == JL_OK; r++) {
         other = jli_hop_partner(n, pe, r);
-        if (other >= 0 && sends_early(config->to[other]))
+        if (other >= 0 && sends_early(config->to[other])) {
+            par->failed_pe = other;
             status = jl_chan_send(config->to[other], par->buf, len,
                                   config->timeout_us);
+        }
     }
     for (r = 0; r < rounds && status == JL_OK; r++) {
         int early;
@@ -60,6 +63,7 @@ static int exchange(jl_par *par)
         other = jli_hop_partner(n, pe, r);
         if (other < 0)
             continue;
+        par->failed_pe = other;
         early = sends_early(config->to[other]);
         if (!early && pe < other)
             status = jl_chan_send(config->to[other], par->buf, len,
@@ -70,6 +74,7 @@ static int exchange(jl_par *par)
             status = jl_chan_send(config->to[other], par->buf, len,
                                   config->timeout_us);
     }
+    par->failed = status;
     return status;
 }
 
@@ -127,9 +132,9 @@ int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch)
             && par->status[j] == JL_OK)
             par->status[j] = jl_imm_update_mode(imm, j, meas->z, scratch);
     if (par->active > 1) {
-        par->failed = exchange(par);
-        if (par->failed != JL_OK)
-            return par->failed;
+        status = exchange(par);
+        if (status != JL_OK)
+            return status;
     }
     status = first_failure(par);
     if (status == JL_OK)

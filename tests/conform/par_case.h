@@ -170,6 +170,7 @@ static inline int par_pe(int pe, int npe, int M, int sticky,
     config.context = bank;
     config.fingerprint = 7;
     config.timeout_us = 5000000;
+    config.start_us = 5000000;
     status = jl_par_init(&par, &bank->imm, &config, buf, sizeof buf,
                          mode_status, z);
     if (status == JL_OK)
