@@ -163,8 +163,8 @@ static void print_table(const struct flight_report *r, FILE *out)
         double median, p99;
         long steps = estimates_times(&run->e, &median, &p99);
 
-        fprintf(out, "%-12s %-10s %8.2f %6ld %8.1f %8.1f %7.1f %8lu %6lu %s\n",
-                run->model, run->positions, rms_error(run, r->data), steps,
+        fprintf(out, "%-12s %-10s %8.2f %6ld %8.1f %8.1f %7.1f %8lu %6lu "
+                "%s\n", run->model, run->positions, rms_error(run, r->data), steps,
                 median, p99, run->serial_us, run->traffic.messages,
                 run->traffic.resent, run->same ? "yes" : "NO");
     }
@@ -183,8 +183,8 @@ static void print_csv(const struct flight_report *r, FILE *out)
 
         fprintf(out, "%s,%s,%.6g,%ld,%.6g,%.6g,%.6g,%lu,%lu,%lu,%d\n",
                 run->model, run->positions, rms_error(run, r->data), steps,
-                median, p99, run->serial_us, run->traffic.messages, run->traffic.octets,
-                run->traffic.resent, run->same);
+                median, p99, run->serial_us, run->traffic.messages,
+                run->traffic.octets, run->traffic.resent, run->same);
     }
 }
 

@@ -50,11 +50,11 @@ int run_max_len(const struct model *model);
 int run_pe(int pe, const struct model *model, const struct options *options,
            jl_chan **to, jl_chan **from);
 
-/* The host's part. */
+/* The host's part.  `alive`, or NULL, is asked now and then: 0 ends the run. */
 struct run_host {
     jl_chan *to, *from;
-    int (*alive)(void *context);        /* asked now and then, or NULL: 0 ends */
-    void *context;                      /* the run                             */
+    int (*alive)(void *context);
+    void *context;
 };
 
 /* Returns JL_OK; or, with a step that failed in *row, its code; or the error of
