@@ -55,7 +55,7 @@ enum {
     JL_EPROB = -6,      /* probabilities below 0, or not summing to 1       */
     JL_ESINGULAR = -7,  /* the innovation covariance S is not positive      */
     JL_ERANGE = -8,     /* an argument outside the function's domain        */
-    JL_EORDER = -9,     /* a call out of order: update before predict       */
+    JL_EORDER = -9,     /* a call out of order: filter before mix           */
     JL_ETIME = -10,     /* a time that goes back                            */
     JL_ETIMEOUT = -11,  /* nothing happened before the deadline             */
     JL_ECLOSED = -12,   /* the other end of the channel has closed          */

@@ -20,7 +20,8 @@
 #endif
 
 /* Largest sizes that an init accepts.  They cost nothing by themselves: the
- * memory is the caller's; they only keep the size products inside an int. */
+ * memory is the caller's; they only keep the size products inside an int of 32
+ * bits (where int has 16, JL_IMM_STATE and the like must stay below 32768). */
 #ifndef JL_MAX_STATES
 #define JL_MAX_STATES 64
 #endif

@@ -7,11 +7,13 @@
  *               P = P- - K S K'                           form standard
  *     loglik    log N(nu; 0, S)
  *
- * The forms are equal in exact arithmetic.  Joseph keeps P positive
- * semidefinite where measurements are far better than the prior, as long as
- * R / (H P- H') is above the number type's epsilon; standard is cheaper and
- * fine otherwise.  A form is a const table of functions: a program that names
- * one does not link the other.
+ * The forms are equal in exact arithmetic (Bucy and Joseph 1968; the standard
+ * form is computed as P- - Y'Y with Y = L^-1 H P-, S = L L').  Joseph keeps P
+ * positive semidefinite where measurements are far better than the prior, as
+ * long as R / (H P- H') is above the number type's epsilon; standard is cheaper
+ * and fine otherwise.  Leading multiplications: predict 3/2 n^3; update joseph
+ * 3/2 n^3 + 5/2 n^2 m, standard 3/2 n^2 m.  A form is a const table of
+ * functions: a program that names one does not link the other.
  */
 #ifndef JL_KF_H
 #define JL_KF_H
@@ -76,7 +78,8 @@ int jl_kf_predict(jl_kf *kf, jl_real *scratch);
 int jl_kf_update(jl_kf *kf, jl_real *loglik, const jl_real *z,
                  jl_real *scratch);
 
-/* Predict and update in one: on error the filter is as before the step. */
+/* Predict and update in one; arguments and codes as theirs.  On error the
+ * filter is as before the step. */
 int jl_kf_step(jl_kf *kf, jl_real *loglik, const jl_real *z,
                jl_real *scratch);
 

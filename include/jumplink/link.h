@@ -136,10 +136,11 @@ int jl_link_peek(const jl_link *link);
 int jl_link_input(jl_link *link, const unsigned char *datagram, int len,
                   jl_u32 now);
 
-/* The next datagram to give to the carrier now: written to datagram
- * [JL_FRAME_MAX].  Returns its length, or 0: nothing to send now.  Call until
- * it returns 0. */
-int jl_link_output(jl_link *link, unsigned char *datagram, jl_u32 now);
+/* The next datagram to give to the carrier now: written to datagram [cap],
+ * cap >= JL_FRAME_MAX.  Call until it returns 0.
+ * Returns its length; 0: nothing to send now; JL_ENOMEM. */
+int jl_link_output(jl_link *link, unsigned char *datagram, int cap,
+                   jl_u32 now);
 
 /* Microseconds until jl_link_output may have something by time alone: 0 for
  * now; -1 for not before something comes in or is sent. */

@@ -109,7 +109,7 @@ int jl_chain_sojourn(jl_real *Pi, const jl_real *sojourn_s, int M,
 
 /* Check a chain: Pi [M,M] and mu [M]; either may be NULL.
  * Returns JL_OK, JL_ENONFINITE, or JL_EPROB (an entry below 0, a row or mu
- * whose sum is further from 1 than JL_PROB_TOLERANCE). */
+ * whose sum is further from 1 than JL_PROB_TOLERANCE + 2 M JL_EPSILON). */
 #if JL_REAL_FLOAT
 #define JL_PROB_TOLERANCE JL_C(1.0e-5)
 #else

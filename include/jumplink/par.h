@@ -67,7 +67,8 @@ typedef struct jl_estimate {
 int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, unsigned char *buf,
                   int cap, long timeout_us);
 
-/* Send a measurement with m components; buf [cap], cap >= JL_PAR_MSG(1, 1, m).
+/* Send a measurement with m components; receive the answer to each before the
+ * next, or at most 2 slots + 1 may be on their way (slots of the channels). buf [cap], cap >= JL_PAR_MSG(1, 1, m).
  * Returns JL_OK, JL_ENOMEM, or the channel's error. */
 int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,
                  unsigned char *buf, int cap, long timeout_us);
@@ -79,13 +80,14 @@ int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,
 int jl_host_recv(jl_chan *from_pe0, jl_estimate *estimate, int M, int n,
                  unsigned char *buf, int cap, long timeout_us);
 
-/* Tell the PEs that the run is over.  buf [cap], 16 are enough. */
+/* Tell the PEs that the run is over.  buf [cap], 16 are enough.
+ * Returns JL_OK, JL_ENOMEM, or the channel's error. */
 int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,
                  long timeout_us);
 
 /* --- the PE's side ----------------------------------------------------- */
 
-/* Called on every PE before a step, with the same arguments everywhere: for
+/* Called before a step on every PE that owns modes, with the same arguments: for
  * models rebuilt for meas->dt (jl_mode_motion, then jl_imm_chain), or started
  * from a first measurement (jl_imm_set).  Must do the same on every PE, and if
  * it changes a mode it must also call jl_imm_chain or jl_imm_set, which void
@@ -107,7 +109,9 @@ typedef struct jl_par_config {
     void *context;
     jl_u32 fingerprint;         /* of the model: equal on all PEs and host  */
     long start_us;              /* longest wait for the others at the start */
-    long timeout_us;            /* ... and for each message of a step       */
+    long timeout_us;            /* ... and for each message of a step; either
+                                   may be JL_FOREVER; the wait for the next
+                                   measurement has no limit                 */
 } jl_par_config;
 
 typedef struct jl_par {
@@ -118,7 +122,7 @@ typedef struct jl_par {
     int failed;                 /* JL_OK, or the error of a channel         */
     int failed_pe;              /* ... to or from this PE; npe: the host    */
     jl_u32 seq;                 /* of the last measurement                  */
-    unsigned long steps;        /* measurements used                        */
+    unsigned long steps;        /* measurements used, failed steps too      */
     unsigned long refused;      /* ... and refused, with their code         */
     unsigned char *buf;         /* [cap]                                    */
     int cap;
@@ -127,10 +131,12 @@ typedef struct jl_par {
 } jl_par;
 
 /* The owner table that deals modes out in turn, j to PE j mod npe: the mapping
- * that the paper's heuristic finds for modes of equal cost.  owner [M]. */
+ * that the paper's heuristic finds for modes of equal cost.  owner [M];
+ * 1 <= npe <= JL_MAX_PES. */
 void jl_par_deal(unsigned char *owner, int M, int npe);
 
-/* Bind a PE's part to its filter (all M modes on every PE) and memory: buf
+/* Bind a PE's part to its filter (all M modes on every PE) and memory, which
+ * outlive it, as do the arrays that config points to: buf
  * [cap] octets, cap >= JL_PAR_BUF(M, n, m); status [M]; z [m].
  * Returns JL_OK, JL_EDIM (pe, npe, owner), JL_ENOMEM, JL_ETOOLONG (a channel's
  * max_len is below what its messages need); *par is untouched on error. */
@@ -147,7 +153,7 @@ int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
 int jl_par_serve(jl_par *par, jl_real *scratch);
 
 /* One step, when the measurement is already on every PE and every PE calls
- * this: returns on all of them the same JL_OK or code of the first mode that
+ * this: returns on all of them that own modes the same JL_OK or code of the first mode that
  * failed, as jl_imm_step; or the error of the channel that failed.  The
  * combined estimate is computed on PE0 (on the others call jl_imm_combine).
  * After the error of a channel the PEs may differ: the run is over. */

@@ -87,7 +87,8 @@ static void flush(jl_lcm *l)
 
         if (i == l->node)
             continue;
-        while ((len = jl_link_output(&p->link, datagram, now)) > 0)
+        while ((len = jl_link_output(&p->link, datagram, sizeof datagram,
+                                     now)) > 0)
             if (l->drop <= 0 || !dropped(l))
                 lcm_publish(l->lcm, p->channel, datagram, (unsigned)len);
     }

@@ -120,6 +120,7 @@ void jl_imm_mix_mode(jl_imm *imm, int j, jl_real *scratch)
     jl_real *x0 = imm->xw + j * n, *P0 = imm->Pw + j * n * n;
     jl_real *w = scratch, *d = w + M;
 
+    JL_ASSERT(j >= 0 && j < M);
     if (imm->logc[j] < -JL_REAL_MAX) {          /* cannot be entered */
         jli_copy(x0, imm->x + j * n, n);
         jli_copy(P0, imm->P + j * n * n, n * n);

@@ -1,4 +1,4 @@
-/* Sums over modes, always in index order. */
+/* Sums over modes, always in index order; and stage 4, which is one. */
 #include "imm/imm_stage.h"
 
 #include "mat/mat_k.h"
@@ -46,4 +46,11 @@ void jli_pool(jl_real *mean, jl_real *cov, const jl_real *w,
     for (a = 0; a < n; a++)
         for (b = 0; b < a; b++)
             cov[a * n + b] = cov[b * n + a];
+}
+
+void jl_imm_combine(jl_imm *imm)
+{
+    jli_pool(imm->xhat, imm->Phat, imm->mu, imm->x, imm->P, imm->d,
+             imm->M, imm->n);
+    imm->combined = 1;
 }

@@ -1,4 +1,4 @@
-/* Stages 2 to 4, and the four in one. */
+/* Stages 2 and 3, and the four in one. */
 #include "imm/imm_stage.h"
 
 #include "mat/mat_k.h"
@@ -9,6 +9,7 @@ int jl_imm_predict_mode(jl_imm *imm, int j, jl_real *scratch)
     jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
     jl_real *xp = scratch, *Pp = xp + n;
 
+    JL_ASSERT(j >= 0 && j < imm->M);
     status = imm->form->predict(xp, Pp, &imm->modes[j], x, P, Pp + n * n);
     if (status == JL_OK) {
         jli_copy(x, xp, n);
@@ -26,6 +27,7 @@ int jl_imm_update_mode(jl_imm *imm, int j, const jl_real *z,
     jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
     jl_real *xu = scratch, *Pu = xu + n;
 
+    JL_ASSERT(j >= 0 && j < imm->M);
     if (imm->stage == JLI_MIXED)
         imm->stage = JLI_FILTERED;
     imm->missing = z == NULL;
@@ -66,33 +68,43 @@ static void swap(jl_real **a, jl_real **b)
     *b = t;
 }
 
+/* The largest log-likelihood of a mode that is possible.  Differences to it
+ * keep the digits of log c, however large a likelihood's logarithm is: after an
+ * outlier of 1e5 sigma that is 1e10. */
+static jl_real best_likelihood(const jl_imm *imm)
+{
+    jl_real best = -JL_REAL_MAX;
+    int j;
+
+    for (j = 0; j < imm->M; j++)
+        if (imm->logc[j] >= -JL_REAL_MAX && imm->l[j] > best)
+            best = imm->l[j];
+    return best;
+}
+
 int jl_imm_weigh(jl_imm *imm)
 {
     int j, M = imm->M;
-    jl_real *e = imm->e, sum, loglik;
+    jl_real *e = imm->e, best, sum, lse;
 
     if (imm->stage != JLI_FILTERED)
         return JL_EORDER;
-    for (j = 0; j < M; j++)
-        e[j] = imm->logc[j] + imm->l[j];
-    loglik = jli_log_sum_exp(e, M, &sum);
+    best = best_likelihood(imm);
     for (j = 0; j < M; j++) {
-        imm->logmu[j] = imm->logc[j] + imm->l[j] - loglik;
+        imm->logmu[j] = imm->logc[j] + (imm->l[j] - best);
+        e[j] = imm->logmu[j];
+    }
+    lse = jli_log_sum_exp(e, M, &sum);
+    for (j = 0; j < M; j++) {
+        imm->logmu[j] -= lse;
         imm->mu[j] = e[j] / sum;
     }
-    imm->loglik = imm->missing ? 0 : loglik;
+    imm->loglik = imm->missing ? 0 : best + lse;
     swap(&imm->x, &imm->xw);
     swap(&imm->P, &imm->Pw);
     imm->stage = JLI_IDLE;
     imm->combined = 0;
     return JL_OK;
-}
-
-void jl_imm_combine(jl_imm *imm)
-{
-    jli_pool(imm->xhat, imm->Phat, imm->mu, imm->x, imm->P, imm->d,
-             imm->M, imm->n);
-    imm->combined = 1;
 }
 
 int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch)

@@ -85,10 +85,13 @@ static int acknowledge(jl_link *link, unsigned char *datagram)
     return put(link, JL_FRAME_ACK, link->peer, room, NULL, 0, datagram);
 }
 
-int jl_link_output(jl_link *link, unsigned char *datagram, jl_u32 now)
+int jl_link_output(jl_link *link, unsigned char *datagram, int cap,
+                   jl_u32 now)
 {
     jl_u32 peer = link->doubt;
 
+    if (cap < JL_FRAME_MAX)
+        return JL_ENOMEM;
     if (jli_over(link))
         return 0;
     if (link->alive != 0) {

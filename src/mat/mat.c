@@ -43,23 +43,3 @@ void jl_mat_lower_solve(const jl_real *L, jl_real *y, int n)
 {
     jli_lower_solve(L, y, n, 1);
 }
-
-void jl_mat_pack(jl_real *p, const jl_real *A, int n)
-{
-    int i, j;
-
-    for (i = 0; i < n; i++)
-        for (j = i; j < n; j++)
-            *p++ = A[i * n + j];
-}
-
-void jl_mat_unpack(jl_real *A, const jl_real *p, int n)
-{
-    int i, j;
-
-    for (i = 0; i < n; i++)
-        for (j = i; j < n; j++) {
-            A[i * n + j] = *p;
-            A[j * n + i] = *p++;
-        }
-}

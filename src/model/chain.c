@@ -3,6 +3,19 @@
 
 #include "base/mathx.h"
 
+/* 1 - exp(-t), with all its digits for small t: t - t^2/2 + t^3/6 - ... */
+static jl_real one_minus_exp(jl_real t)
+{
+    jl_real s = 1;
+    int k;
+
+    if (t > JL_C(0.5))
+        return 1 - jl_exp(-t);
+    for (k = 16; k > 1; k--)
+        s = 1 - t / (jl_real)k * s;
+    return t * s;
+}
+
 int jl_chain_sojourn(jl_real *Pi, const jl_real *sojourn_s, int M,
                      jl_real dt)
 {
@@ -18,10 +31,10 @@ int jl_chain_sojourn(jl_real *Pi, const jl_real *sojourn_s, int M,
         if (sojourn_s[i] <= 0)
             return JL_ERANGE;
     for (i = 0; i < M; i++) {
-        jl_real stay = M > 1 ? jl_exp(-dt / sojourn_s[i]) : 1;
+        jl_real leave = M > 1 ? one_minus_exp(dt / sojourn_s[i]) : 0;
 
         for (j = 0; j < M; j++)
-            Pi[i * M + j] = i == j ? stay : (1 - stay) / (jl_real)(M - 1);
+            Pi[i * M + j] = i == j ? 1 - leave : leave / (jl_real)(M - 1);
     }
     return JL_OK;
 }
@@ -38,7 +51,8 @@ static int distribution(const jl_real *p, int M)
             return JL_EPROB;
         sum += p[i];
     }
-    return jli_abs(sum - 1) <= JL_PROB_TOLERANCE ? JL_OK : JL_EPROB;
+    return jli_abs(sum - 1) <= JL_PROB_TOLERANCE
+        + 2 * (jl_real)M * JL_EPSILON ? JL_OK : JL_EPROB;
 }
 
 int jl_chain_check(const jl_real *Pi, const jl_real *mu, int M)

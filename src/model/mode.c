@@ -43,7 +43,8 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
         return status;
     if (jli_cholesky(L, R, m) != JL_OK)
         return JL_EDEF;
-    jl_mat_sandwich(W, G, Q, NULL, GQ, n, p);
+    jli_mul(GQ, G, Q, n, p, p);
+    jli_mul_t_sym(W, GQ, G, NULL, n, p);
     if (!jl_vec_within(W, n * n, JL_LARGE * JL_LARGE))
         return JL_ENONFINITE;
     if (w_bar != NULL) {

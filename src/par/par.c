@@ -7,6 +7,7 @@ void jl_par_deal(unsigned char *owner, int M, int npe)
 {
     int j;
 
+    JL_ASSERT(npe >= 1 && npe <= JL_MAX_PES);
     for (j = 0; j < M; j++)
         owner[j] = (unsigned char)(j % npe);
 }
@@ -181,7 +182,7 @@ static int accept_meas(jl_par *par, jl_meas *meas, int len)
 
     if (status != JL_OK)
         return status;
-    if (par->steps + par->refused > 0 && meas->seq <= par->seq)
+    if (par->steps > 0 && meas->seq <= par->seq)
         return JL_EMSG;
     if (!jli_finite(meas->dt)
         || (meas->z != NULL && !jl_vec_within(par->z, m, JL_LARGE)))

@@ -32,15 +32,17 @@ int jli_msg_meas_read(jl_meas *meas, jl_real *z, int m,
 {
     int count;
 
-    if (len < JLI_MSG_HEADER + JL_REAL_OCTETS)
+    if (len < JLI_MSG_HEADER)
         return JL_ELENGTH;
+    if (buf[0] != JLI_MEAS || buf[1] > 1)
+        return JL_EMSG;
+    meas->seq = jl_get_u32(buf + 4);    /* first: the refusal bears it */
+    meas->first = buf[1];
     count = (int)jl_get_u16(buf + 2);
-    if (buf[0] != JLI_MEAS || buf[1] > 1 || (count != 0 && count != m))
+    if (count != 0 && count != m)
         return JL_EMSG;
     if (len != JLI_MSG_HEADER + (1 + count) * JL_REAL_OCTETS)
         return JL_ELENGTH;
-    meas->seq = jl_get_u32(buf + 4);
-    meas->first = buf[1];
     buf = jl_get_reals(buf + JLI_MSG_HEADER, &meas->dt, 1);
     (void)jl_get_reals(buf, z, count);
     meas->z = count > 0 ? z : NULL;

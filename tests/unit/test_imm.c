@@ -158,6 +158,23 @@ static void make(int M, int n, int m)
     make_chain();
 }
 
+/* All modes and their estimates are those of mode 0. */
+static void make_alike(void)
+{
+    size_t n = (size_t)in.n;
+    int j;
+
+    for (j = 1; j < in.M; j++) {
+        memcpy(in.F[j], in.F[0], sizeof in.F[0]);
+        memcpy(in.G[j], in.G[0], sizeof in.G[0]);
+        memcpy(in.H[j], in.H[0], sizeof in.H[0]);
+        memcpy(in.R[j], in.R[0], sizeof in.R[0]);
+        in.w_bar[j] = in.w_bar[0];
+        memcpy(in.x + (size_t)j * n, in.x, n * sizeof *in.x);
+        memcpy(in.P + (size_t)j * n * n, in.P, n * n * sizeof *in.P);
+    }
+}
+
 static void set_mode(struct rig *r, int j)
 {
     jl_real q = 1;
@@ -773,6 +790,30 @@ static void test_imm_outliers(void **state)
     }
 }
 
+/* Modes that a measurement does not tell apart keep their probabilities, also
+ * when the likelihoods' logarithms are so large that log mu is below their
+ * last digit. */
+static void test_imm_outlier_keeps_the_prior(void **state)
+{
+    jl_real distance, z[Z_MAX];
+    int j;
+
+    (void)state;
+    for (distance = 10; distance < JL_C(1.0e7); distance *= 10) {
+        make(2, 3, 1);
+        make_alike();
+        for (j = 0; j < 4; j++)
+            in.Pi[j] = j % 3 == 0;
+        in.mu[0] = JL_C(0.9);
+        in.mu[1] = JL_C(0.1);
+        bind(&rig, &jl_kf_joseph, JL_MIX_AUTO);
+        z[0] = distance;
+        assert_int_equal(step(&rig, z), JL_OK);
+        assert_close(rig.imm.mu[0], 0.9, 8 * EPS);
+        assert_close(rig.imm.logmu[0], log(0.9), 8 * EPS);
+    }
+}
+
 /* mu = Pi' mu, and only that. */
 static void test_imm_missing_measurement(void **state)
 {
@@ -896,15 +937,7 @@ static void test_imm_of_equal_modes_is_a_kf(void **state)
     (void)state;
     for (run = 0; run < 4; run++) {
         make(3, 2, 2);
-        for (j = 1; j < 3; j++) {
-            memcpy(in.F[j], in.F[0], sizeof in.F[0]);
-            memcpy(in.G[j], in.G[0], sizeof in.G[0]);
-            memcpy(in.H[j], in.H[0], sizeof in.H[0]);
-            memcpy(in.R[j], in.R[0], sizeof in.R[0]);
-            in.w_bar[j] = in.w_bar[0];
-            memcpy(in.x + j * 2, in.x, 2 * sizeof *in.x);
-            memcpy(in.P + j * 4, in.P, 4 * sizeof *in.P);
-        }
+        make_alike();
         if (run >= 2)
             make_sticky(run == 2 ? 0 : JL_C(0.75));
         bind(&rig, &jl_kf_joseph, run % 2);
@@ -1479,6 +1512,7 @@ int main(void)
         cmocka_unit_test(test_imm_general_chains),
         cmocka_unit_test(test_imm_sticky_equals_general),
         cmocka_unit_test(test_imm_outliers),
+        cmocka_unit_test(test_imm_outlier_keeps_the_prior),
         cmocka_unit_test(test_imm_missing_measurement),
         cmocka_unit_test(test_imm_modes_in_another_order),
         cmocka_unit_test(test_imm_of_one_mode_is_a_kf),

@@ -175,7 +175,7 @@ static long act(int i)
         e->got++;
         e->next_recv = w.now + e->every;
     }
-    while (len = jl_link_output(&e->link, out, w.now), len > 0) {
+    while (len = jl_link_output(&e->link, out, JL_FRAME_MAX, w.now), len > 0) {
         assert_in_range(len, JL_FRAME_HEADER + JL_FRAME_TRAILER, JL_FRAME_MAX);
         carry(1 - i, out, len);
     }
@@ -265,7 +265,8 @@ static void test_link_clean(void **state)
     /* all is said: no timer runs, nothing goes out */
     assert_int_equal(jl_link_timer(&w.e[0].link, w.now), -1);
     assert_int_equal(jl_link_timer(&w.e[1].link, w.now), -1);
-    assert_int_equal(jl_link_output(&w.e[0].link, msg, w.now + 9999999), 0);
+    assert_int_equal(jl_link_output(&w.e[0].link, msg, JL_FRAME_MAX,
+                                    w.now + 9999999), 0);
 }
 
 static void test_link_loses_a_third(void **state)
@@ -379,7 +380,7 @@ static void test_link_starts_in_any_order(void **state)
     begin(clean, 1);
     for (now = 0; now < SECONDS(3600); now += (jl_u32)jl_link_timer(
                                            &w.e[0].link, now)) {
-        len = jl_link_output(&w.e[0].link, out, now);
+        len = jl_link_output(&w.e[0].link, out, JL_FRAME_MAX, now);
         if (len > 0) {
             hellos++;
             assert_int_equal(out[3], JL_FRAME_HELLO);
@@ -398,9 +399,10 @@ static void test_link_starts_in_any_order(void **state)
     }
     c.rto_us = JL_LINK_MAX_US;  /* a slow carrier: no HELLO before its time */
     assert_int_equal(jl_link_init(&w.e[0].link, &c, w.e[0].mem, MEM, 0), JL_OK);
-    assert_true(jl_link_output(&w.e[0].link, out, 0) > 0);
+    assert_true(jl_link_output(&w.e[0].link, out, JL_FRAME_MAX, 0) > 0);
     assert_int_equal(jl_link_timer(&w.e[0].link, 0), JL_LINK_MAX_US);
-    assert_true(jl_link_output(&w.e[0].link, out, JL_LINK_MAX_US) > 0);
+    assert_true(jl_link_output(&w.e[0].link, out, JL_FRAME_MAX,
+                               JL_LINK_MAX_US) > 0);
     assert_int_equal(jl_link_timer(&w.e[0].link, JL_LINK_MAX_US),
                      JL_LINK_MAX_US);
 }
@@ -589,11 +591,11 @@ static void test_link_hello_to_an_up_link(void **state)
     /* of another session: it is asked, once, and does not answer */
     assert_int_equal(forge(JL_FRAME_HELLO, 0x7777, 0, 0, 0, 0), JL_EPEER);
     assert_int_equal(jl_link_timer(&w.e[1].link, w.now), 0);
-    assert_true(jl_link_output(&w.e[1].link, out, w.now) > 0);
+    assert_true(jl_link_output(&w.e[1].link, out, JL_FRAME_MAX, w.now) > 0);
     assert_int_equal(out[3], JL_FRAME_DOUBT);
     assert_int_equal(jl_get_u32(out + 12), 0x7777);
     assert_int_equal(jl_get_u32(out + 16), 0);
-    assert_int_equal(jl_link_output(&w.e[1].link, out, w.now), 0);
+    assert_int_equal(jl_link_output(&w.e[1].link, out, JL_FRAME_MAX, w.now), 0);
     assert_int_equal(forge(JL_FRAME_HELLO, 0x7777, 0x2222, 0, 0, 0), JL_EPEER);
     assert_int_equal(forge(JL_FRAME_DATA, 0x7777, 0x2222, 0, 0,
                            JL_FRAME_PAYLOAD), JL_EPEER);
@@ -601,9 +603,9 @@ static void test_link_hello_to_an_up_link(void **state)
     assert_int_equal(w.e[1].link.count.stale, stale + 4);
     assert_int_equal(w.e[1].link.failed, JL_OK);
     /* of this session: it is acknowledged */
-    assert_true(jl_link_output(&w.e[1].link, out, w.now) > 0);
+    assert_true(jl_link_output(&w.e[1].link, out, JL_FRAME_MAX, w.now) > 0);
     assert_int_equal(forge(JL_FRAME_HELLO, 0x1111, 0, 0, 0, 0), JL_OK);
-    assert_true(jl_link_output(&w.e[1].link, out, w.now) > 0);
+    assert_true(jl_link_output(&w.e[1].link, out, JL_FRAME_MAX, w.now) > 0);
     assert_int_equal(out[3], JL_FRAME_ACK);
     assert_int_equal(forge(JL_FRAME_ALIVE, 0x1111, 0x2222, 0, 0, 0), JL_EPEER);
     assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2223, 0, 0, 4), JL_EPEER);
@@ -612,7 +614,7 @@ static void test_link_hello_to_an_up_link(void **state)
     assert_int_equal(forge(JL_FRAME_ALIVE, 0x7777, 0x2222, 0, 0, 0), JL_EPEER);
     assert_int_equal(w.e[1].link.failed, JL_EPEER);
     assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, 0, 0, 4), JL_EPEER);
-    assert_int_equal(jl_link_output(&w.e[1].link, out, w.now), 0);
+    assert_int_equal(jl_link_output(&w.e[1].link, out, JL_FRAME_MAX, w.now), 0);
 }
 
 static void test_link_hello_repeats(void **state)
@@ -626,35 +628,36 @@ static void test_link_hello_repeats(void **state)
     begin(clean, 1);
     assert_int_equal(jl_link_timer(l, w.now), 0);
     for (i = 0; i < 5; i++) {
-        assert_int_equal(jl_link_output(l, out, w.now), 36);
+        assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 36);
         assert_int_equal(out[3], JL_FRAME_HELLO);
         assert_int_equal(jl_get_u32(out + 8), 0x2222);
         assert_int_equal(jl_get_u32(out + 12), 0);
         assert_int_equal(jl_get_u32(out + 16), 0);
-        assert_int_equal(jl_link_output(l, out, w.now), 0);
+        assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 0);
         assert_int_equal(jl_link_timer(l, w.now), waits[i]);
-        assert_int_equal(jl_link_output(l, out, w.now + (jl_u32)waits[i] - 1),
+        assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX,
+                                        w.now + (jl_u32)waits[i] - 1),
                          0);
         w.now += (jl_u32)waits[i];
     }
     /* a HELLO is answered at once */
-    jl_link_output(l, out, w.now);
+    jl_link_output(l, out, JL_FRAME_MAX, w.now);
     assert_int_equal(forge(JL_FRAME_HELLO, 0x1111, 0, 0, 0, 0), JL_OK);
     assert_int_equal(jl_link_timer(l, w.now), 0);
-    assert_int_equal(jl_link_output(l, out, w.now), 36);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 36);
     assert_int_equal(out[3], JL_FRAME_HELLO);
     assert_int_equal(jl_get_u32(out + 12), 0x1111);
-    assert_int_equal(jl_link_output(l, out, w.now), 0);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 0);
     assert_int_equal(l->up, 0);
     /* and once up, it is the data's waiting time that counts */
     assert_int_equal(forge(JL_FRAME_HELLO, 0x1111, 0x2222, 0, 0, 0), JL_OK);
-    assert_int_equal(jl_link_output(l, out, w.now), 36);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 36);
     assert_int_equal(out[3], JL_FRAME_ACK);
     assert_int_equal(l->count.acks, 1);
     assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
     assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
-    assert_int_equal(jl_link_output(l, out, w.now), 37);
-    assert_int_equal(jl_link_output(l, out, w.now), 37);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 37);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 37);
     assert_int_equal(jl_link_timer(l, w.now), 20000);
 }
 
@@ -672,7 +675,7 @@ static void test_link_room_at_half(void **state)
     assert_int_equal(window, 6);
     for (i = 0; i < window; i++)
         assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, i, 0, 4), JL_OK);
-    assert_true(jl_link_output(l, out, w.now) > 0);
+    assert_true(jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0);
     assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, i, 0, 4), JL_EAGAIN);
     assert_int_equal(l->count.early, 1);
     for (i = 0; i < window; i++) {
@@ -680,7 +683,7 @@ static void test_link_room_at_half(void **state)
         assert_int_equal(jl_link_recv(l, msg, MAX_LEN), 4);
         if (i == 2) {
             assert_int_equal(jl_link_timer(l, w.now), 0);
-            assert_true(jl_link_output(l, out, w.now) > 0);
+            assert_true(jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0);
             assert_int_equal(out[3], JL_FRAME_ACK);
             assert_int_equal(jl_get_u32(out + 16), 1);
             assert_int_equal(jl_get_u32(out + 20), window);
@@ -695,20 +698,20 @@ static void test_link_room_at_half(void **state)
     assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, i, 0, 4), JL_OK);
     while (jl_link_recv(l, msg, MAX_LEN) >= 0)
         ;
-    while (status = jl_link_output(l, out, w.now), status > 0)
+    while (status = jl_link_output(l, out, JL_FRAME_MAX, w.now), status > 0)
         assert_int_equal(jl_get_u32(out + 16), 0);
     /* the other side of it: told of room, send at once */
     for (i = 0; i < 3; i++)
         assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
-    while (jl_link_output(l, out, w.now) > 0)
+    while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
         ;
     assert_int_equal(forge(JL_FRAME_ACK, 0x1111, 0x2222, 1, 1, 0), JL_OK);
     assert_int_equal(jl_link_timer(l, w.now), 0);
-    assert_int_equal(jl_link_output(l, out, w.now), 37);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 37);
     assert_int_equal(jl_get_u32(out + 16), 1);
-    assert_int_equal(jl_link_output(l, out, w.now), 37);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 37);
     assert_int_equal(jl_get_u32(out + 16), 2);
-    assert_int_equal(jl_link_output(l, out, w.now), 0);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 0);
     /* progress starts the waiting time anew */
     w.now += 15000;
     assert_int_equal(forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, 2, 0), JL_OK);
@@ -721,17 +724,17 @@ static void test_link_before_it_is_up(void **state)
 
     (void)state;
     begin(clean, 1);
-    assert_true(jl_link_output(&w.e[1].link, out, w.now) > 0);
+    assert_true(jl_link_output(&w.e[1].link, out, JL_FRAME_MAX, w.now) > 0);
     /* data of somebody who does not know us; an answer to nothing */
     assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0, 0, 0, 4), JL_EPEER);
     assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2223, 0, 0, 4), JL_EPEER);
     assert_int_equal(forge(JL_FRAME_ALIVE, 0x1111, 0x2222, 0, 0, 0), JL_EPEER);
     assert_int_equal(forge(JL_FRAME_DOUBT, 0x1111, 0x2223, 0, 0, 0), JL_EPEER);
-    assert_int_equal(jl_link_output(&w.e[1].link, out, w.now), 0);
+    assert_int_equal(jl_link_output(&w.e[1].link, out, JL_FRAME_MAX, w.now), 0);
     /* who doubts is answered, and does not bring us up */
     assert_int_equal(forge(JL_FRAME_DOUBT, 0x1110, 0x2222, 0, 0, 0), JL_OK);
     assert_int_equal(jl_link_timer(&w.e[1].link, w.now), 0);
-    assert_true(jl_link_output(&w.e[1].link, out, w.now) > 0);
+    assert_true(jl_link_output(&w.e[1].link, out, JL_FRAME_MAX, w.now) > 0);
     assert_int_equal(out[3], JL_FRAME_ALIVE);
     assert_int_equal(jl_get_u32(out + 12), 0x1110);
     assert_int_equal(jl_get_u32(out + 16), 0);
@@ -770,7 +773,7 @@ static void test_link_refuses_foreign(void **state)
     assert_int_equal(jl_link_input(l, out, 0, w.now), JL_ELENGTH);
     assert_int_equal(l->count.refused, 6);
     assert_int_equal(l->count.received, 0);
-    assert_int_equal(jl_link_output(l, msg, w.now), 0);
+    assert_int_equal(jl_link_output(l, msg, JL_FRAME_MAX, w.now), 0);
     assert_int_equal(jl_link_input(l, out, len, w.now), JL_OK);
     assert_int_equal(l->count.received, 1);
 }
@@ -920,25 +923,25 @@ static void test_link_acknowledges_in_time(void **state)
     /* alone: after ack_us, not before */
     forge(JL_FRAME_LAST, 0x1111, 0x2222, 0, 0, 4);
     assert_int_equal(jl_link_idle(l), 0);
-    assert_int_equal(jl_link_output(l, out, w.now), 0);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 0);
     assert_int_equal(jl_link_timer(l, w.now), 2000);
     assert_int_equal(jl_link_timer(l, w.now + 1500), 500);
     assert_int_equal(jl_link_timer(l, w.now + 2500), 0);
-    assert_int_equal(jl_link_output(l, out, w.now + 1999), 0);
-    assert_true(jl_link_output(l, out, w.now + 2000) > 0);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now + 1999), 0);
+    assert_true(jl_link_output(l, out, JL_FRAME_MAX, w.now + 2000) > 0);
     assert_int_equal(out[3], JL_FRAME_ACK);
     assert_int_equal(jl_get_u32(out + 20), 1);
     assert_int_equal(jl_link_idle(l), 1);
     /* a second time: at once */
     assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, 0, 0, 4), JL_EORDER);
     assert_int_equal(jl_link_timer(l, w.now), 0);
-    assert_true(jl_link_output(l, out, w.now) > 0);
+    assert_true(jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0);
     /* half a window: at once */
     for (i = 0; i < l->window / 2 - 1; i++)
         forge(JL_FRAME_LAST, 0x1111, 0x2222, 1 + (jl_u32)i, 0, 4);
-    assert_int_equal(jl_link_output(l, out, w.now), 0);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 0);
     forge(JL_FRAME_LAST, 0x1111, 0x2222, 1 + (jl_u32)i, 0, 4);
-    assert_true(jl_link_output(l, out, w.now) > 0);
+    assert_true(jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0);
     assert_int_equal(out[3], JL_FRAME_ACK);
     while (jl_link_recv(l, msg, MAX_LEN) >= 0)
         ;
@@ -946,10 +949,10 @@ static void test_link_acknowledges_in_time(void **state)
     forge(JL_FRAME_LAST, 0x1111, 0x2222, 2 + (jl_u32)i, 0, 4);
     assert_int_equal(jl_link_send(l, msg, 3), JL_OK);
     assert_int_equal(jl_link_timer(l, w.now), 0);
-    assert_true(jl_link_output(l, out, w.now) > 0);
+    assert_true(jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0);
     assert_int_equal(out[3], JL_FRAME_LAST);
     assert_int_equal(jl_get_u32(out + 20), 3 + i);
-    assert_int_equal(jl_link_output(l, out, w.now), 0);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 0);
     assert_int_equal(jl_link_timer(l, w.now), 20000);
 }
 
@@ -965,14 +968,14 @@ static void test_link_backs_off(void **state)
     up();
     assert_int_equal(jl_link_send(l, msg, 3), JL_OK);
     assert_int_equal(jl_link_send(l, msg, 3), JL_OK);
-    assert_true(jl_link_output(l, out, w.now) > 0);
+    assert_true(jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0);
     for (i = 0; i < 7; i++) {
-        assert_true(jl_link_output(l, out, w.now) > 0 || i > 0);
-        assert_int_equal(jl_link_output(l, out, w.now), 0);
+        assert_true(jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0 || i > 0);
+        assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 0);
         assert_int_equal(jl_link_timer(l, w.now), waits[i]);
         w.now += (jl_u32)waits[i];
         assert_int_equal(jl_link_timer(l, w.now), 0);
-        assert_true(jl_link_output(l, out, w.now) > 0);
+        assert_true(jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0);
         assert_int_equal(jl_get_u32(out + 16), 0);
     }
     /* an acknowledgement of nothing new is no progress */
@@ -981,7 +984,7 @@ static void test_link_backs_off(void **state)
     assert_int_equal(jl_link_timer(l, w.now), 319000);
     /* progress: the rest at once, and the first waiting time again */
     forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, 1, 0);
-    assert_true(jl_link_output(l, out, w.now) > 0);
+    assert_true(jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0);
     assert_int_equal(jl_get_u32(out + 16), 1);
     assert_int_equal(jl_link_timer(l, w.now), 20000);
     assert_int_equal(l->count.sent, 2);
@@ -1082,7 +1085,7 @@ static void test_link_smallest(void **state)
         if (sent < 300 && jl_link_send(&l[0], NULL, 0) == JL_OK)
             sent++;
         for (i = 0; i < 2; i++)
-            while (len = jl_link_output(&l[i], out, now), len > 0)
+            while (len = jl_link_output(&l[i], out, JL_FRAME_MAX, now), len > 0)
                 if (dice(3) > 0)
                     jl_link_input(&l[1 - i], out, len, now);
         if (jl_link_recv(&l[1], NULL, 0) == 0)

@@ -694,7 +694,7 @@ static jl_real sojourn[JL_MAX_MODES];
 
 static void check_sojourn(int M, jl_real dt)
 {
-    long double sum, stay;
+    long double sum, leave;
     int i, j;
 
     for (i = 0; i < M; i++)
@@ -703,11 +703,14 @@ static void check_sojourn(int M, jl_real dt)
     assert_int_equal(jl_chain_sojourn(Pi, sojourn, M, dt), JL_OK);
     assert_true(isnan(Pi[M * M]));
     for (i = 0; i < M; i++) {
-        stay = M == 1 ? 1 : expl(-(long double)dt / sojourn[i]);
+        leave = M == 1 ? 0 : -expm1l(-(long double)dt / sojourn[i]);
         for (sum = 0, j = 0; j < M; j++) {
             assert_true(Pi[i * M + j] >= 0);
-            assert_close(Pi[i * M + j], i == j ? stay : (1 - stay) / (M - 1),
+            assert_close(Pi[i * M + j], i == j ? 1 - leave : leave / (M - 1),
                          (4 + (double)(dt / sojourn[i])) * EPS);
+            if (i != j)                 /* to its own last digits too */
+                assert_close(Pi[i * M + j] / leave * (M - 1), 1,
+                             (8 + 2 * (double)(dt / sojourn[i])) * EPS);
             sum += Pi[i * M + j];
         }
         assert_close(sum, 1, 4 * EPS);
