@@ -22,20 +22,13 @@ static const char help[] =
 
 int cmd_filter(int argc, char **argv)
 {
-    static const struct option known[] = { COMMON_OPTIONS, { 0 } };
     struct options options;
-    int c, status;
+    int status;
 
     options_init(&options, "filter");
-    while ((c = getopt_long(argc, argv, SHORT_OPTIONS, known, NULL)) != -1) {
-        if (c == 'h') {
-            fputs(help, stdout);
-            return 0;
-        }
-        status = options_take(&options, c, argv);
-        if (status != 0)
-            return status;
-    }
+    status = options_parse(&options, argc, argv, help);
+    if (status >= 0)
+        return status;
     if (argc - optind != 2)
         return misuse("filter", "needs MODEL.json and DATA.csv");
     if (options.run != NULL)

@@ -20,23 +20,16 @@ static const char help[] =
 
 int cmd_host(int argc, char **argv)
 {
-    static const struct option known[] = { COMMON_OPTIONS, { 0 } };
     struct options options;
-    int c, status;
+    int status;
 
     options_init(&options, "host");
     options.run = "jumplink";
     options.start_us = 60000000;
     options.port = PORT_BY_HAND;
-    while ((c = getopt_long(argc, argv, SHORT_OPTIONS, known, NULL)) != -1) {
-        if (c == 'h') {
-            fputs(help, stdout);
-            return 0;
-        }
-        status = options_take(&options, c, argv);
-        if (status != 0)
-            return status;
-    }
+    status = options_parse(&options, argc, argv, help);
+    if (status >= 0)
+        return status;
     if (argc - optind != 2)
         return misuse("host", "needs MODEL.json and DATA.csv");
     if (options.pes == 0 || options.lcm_url == NULL)

@@ -51,6 +51,19 @@ void estimates_close(struct estimates *e)
     memset(e, 0, sizeof *e);
 }
 
+void estimates_note(struct estimates *e, long row, const jl_real *x,
+                    const jl_real *P, const jl_real *mu, jl_real loglik,
+                    double us)
+{
+    int n = e->n, M = e->M;
+
+    memcpy(e->x + row * n, x, (size_t)n * sizeof *x);
+    memcpy(e->P + row * n * n, P, (size_t)(n * n) * sizeof *P);
+    memcpy(e->mu + row * M, mu, (size_t)M * sizeof *mu);
+    e->loglik[row] = loglik;
+    e->us[row] = us;
+}
+
 static int same(const jl_real *a, const jl_real *b, long count)
 {
     return memcmp(a, b, (size_t)count * sizeof *a) == 0;

@@ -23,6 +23,11 @@ int estimates_open(struct estimates *e, const struct data_file *data,
                    const struct model *model);
 void estimates_close(struct estimates *e);
 
+/* Take down a row: x [n], P [n,n], mu [M], loglik, and the time it took. */
+void estimates_note(struct estimates *e, long row, const jl_real *x,
+                    const jl_real *P, const jl_real *mu, jl_real loglik,
+                    double us);
+
 /* 1 if all numbers of both have the same bits (times apart). */
 int estimates_same(const struct estimates *a, const struct estimates *b);
 

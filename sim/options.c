@@ -155,3 +155,20 @@ int options_take(struct options *o, int c, char *const *argv)
         return misuse(o->command, "unknown option %s", argv[optind - 1]);
     }
 }
+
+int options_parse(struct options *o, int argc, char **argv, const char *help)
+{
+    static const struct option known[] = { COMMON_OPTIONS, { 0 } };
+    int c, status;
+
+    while ((c = getopt_long(argc, argv, SHORT_OPTIONS, known, NULL)) != -1) {
+        if (c == 'h') {
+            fputs(help, stdout);
+            return 0;
+        }
+        status = options_take(o, c, argv);
+        if (status != 0)
+            return status;
+    }
+    return -1;
+}

@@ -66,6 +66,7 @@ struct options {
     "  -h, --help        this text\n"
 #define PORT_HELP \
     "  --timeout S       longest wait for an answer (default 2)\n" \
+    "  --start S         longest wait for the PEs to start (default 10)\n" \
     "  --lcm-url URL     LCM address, on the network as it is (default: a\n" \
     "                    private network for this run)\n"
 #define RUN_HELP \
@@ -85,6 +86,12 @@ void options_init(struct options *options, const char *command);
  * that getopt_long does not know is refused here.
  * Returns 0, or 2 (the exit status) after a message. */
 int options_take(struct options *options, int c, char *const *argv);
+
+/* Take all options of a command that has only the common ones.
+ * Returns -1: go on with argv from optind; or the exit status, after the help
+ * or a message. */
+int options_parse(struct options *options, int argc, char **argv,
+                  const char *help);
 
 /* A whole number, or seconds, out of an option's value, within [low, high].
  * Return 0, or 2 after a message that names the option. */

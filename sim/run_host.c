@@ -1,0 +1,136 @@
+/* The host's part of a run, for any port; and why a run failed, in words. */
+#include "run.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "clock.h"
+#include "complain.h"
+#include "jumplink/par.h"
+#include "progress.h"
+
+int run_is_channels(int status)
+{
+    return status <= JL_ETIMEOUT;
+}
+
+int run_failed(const struct data_file *data, long row, int status)
+{
+    if (row < 0)
+        complain("PEs", 0, NULL, "the run does not start: %s",
+                 jl_status_text(status));
+    else if (run_is_channels(status))
+        complain("PEs", 0, NULL, "the run ends at %s:%ld: %s", data->path,
+                 data->line[row], jl_status_text(status));
+    else
+        complain(data->path, data->line[row], NULL, "the step fails: %s",
+                 jl_status_text(status));
+    return 1;
+}
+
+/* Between looks at whether everybody is alive. */
+#define SLICE_US 100000L
+
+/* Receive within the deadline, in slices.  `estimate` NULL: the ready word. */
+static int receive(const struct run_host *host, jl_estimate *estimate,
+                   jl_u32 fingerprint, const struct model *model,
+                   unsigned char *buf, int cap, long timeout_us)
+{
+    long slice, left = timeout_us;
+    int status;
+
+    do {
+        slice = left < SLICE_US ? left : SLICE_US;
+        left -= slice;
+        status = estimate == NULL
+            ? jl_host_ready(host->from, fingerprint, buf, cap, slice)
+            : jl_host_recv(host->from, estimate, model->M, model->n, buf, cap,
+                           slice);
+        if (status == JL_ETIMEOUT && host->alive != NULL
+            && !host->alive(host->context))
+            return JL_ECLOSED;
+    } while (status == JL_ETIMEOUT && left > 0);
+    return status;
+}
+
+static int host_row(struct estimates *e, long row,
+                    const struct run_host *host, const jl_meas *meas,
+                    jl_estimate *estimate, const struct model *model,
+                    unsigned char *buf, int cap, long timeout_us)
+{
+    double before = clock_us();
+    int is_start = meas->first && model->x0 == NULL;
+    int status = jl_host_send(host->to, meas, model->m, buf, cap, timeout_us);
+
+    if (status == JL_OK)
+        status = receive(host, estimate, 0, model, buf, cap, timeout_us);
+    if (status == JL_OK && estimate->seq != meas->seq)
+        status = JL_EMSG;
+    if (status == JL_OK)
+        status = estimate->status;
+    if (status == JL_OK)
+        estimates_note(e, row, estimate->x, estimate->P, estimate->mu, estimate->loglik,
+             is_start ? (double)NAN : clock_us() - before);
+    return status;
+}
+
+/* The answer to a measurement may come as late as a PE's own deadline. */
+static long answer_us(const struct options *options)
+{
+    return options->timeout_us + 1000000;
+}
+
+static int host_rows(struct estimates *e, long *row,
+                     const struct run_host *host, const struct model *model,
+                     const struct data_file *data,
+                     const struct options *options, jl_estimate *estimate,
+                     unsigned char *buf, int cap)
+{
+    struct feed feed;
+    jl_meas meas;
+    int status = JL_OK;
+
+    if (feed_open(&feed, data, model, options) != 0)
+        return JL_EDIM;
+    for (*row = 0; *row < data->rows; ++*row) {
+        if (feed_meas(&feed, *row, &meas))
+            status = host_row(e, *row, host, &meas, estimate, model, buf, cap,
+                              answer_us(options));
+        if (status != JL_OK)
+            return status;
+        progress(*row + 1, data->rows);
+    }
+    return JL_OK;
+}
+
+int run_host(struct estimates *e, long *row, const struct run_host *host,
+             const struct model *model, const struct data_file *data,
+             const struct options *options)
+{
+    int n = model->n, cap = run_max_len(model), status;
+    unsigned char *buf = malloc((size_t)cap);
+    jl_real *mem = calloc((size_t)(n + n * n + model->M), sizeof *mem);
+    jl_estimate estimate;
+
+    *row = -1;
+    if (buf == NULL || mem == NULL) {
+        free(buf);
+        free(mem);
+        return JL_ENOMEM;
+    }
+    memset(&estimate, 0, sizeof estimate);
+    estimate.x = mem;
+    estimate.P = mem + n;
+    estimate.mu = estimate.P + n * n;
+    status = receive(host, NULL, run_fingerprint(model, options), model, buf,
+                     cap, options->start_us + 1000000);
+    if (status == JL_OK)
+        status = host_rows(e, row, host, model, data, options, &estimate, buf,
+                           cap);
+    if (status == JL_OK || !run_is_channels(status))
+        (void)jl_host_stop(host->to, buf, cap, options->timeout_us);
+    free(buf);
+    free(mem);
+    return status;
+}

@@ -1,0 +1,88 @@
+/* A PE's part of a run, for any port. */
+#include "run.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bank.h"
+#include "complain.h"
+#include "jumplink/par.h"
+
+int run_max_len(const struct model *model)
+{
+    return JL_PAR_MSG(model->M, model->n, model->m);
+}
+
+jl_u32 run_fingerprint(const struct model *model,
+                       const struct options *options)
+{
+    unsigned char more[4];
+
+    more[0] = (unsigned char)options->pes;
+    more[1] = options->form == &jl_kf_joseph;
+    more[2] = (unsigned char)(options->kf ? options->mode + 2 : 0);
+    more[3] = JL_REAL_OCTETS;
+    return jl_crc32(model->fingerprint, more, sizeof more);
+}
+
+/* "PE0: no word from PE2: nothing happened before the deadline" */
+static void pe_failed(int pe, const jl_par *par, int status)
+{
+    char name[16], other[16] = "the host";
+
+    snprintf(name, sizeof name, "PE%d", pe);
+    if (par->failed == JL_OK) {
+        complain(name, 0, NULL, "%s", jl_status_text(status));
+        return;
+    }
+    if (par->failed_pe < par->config.npe)
+        snprintf(other, sizeof other, "PE%d", par->failed_pe);
+    complain(name, 0, NULL, "%s %s: %s", par->failed == JL_EMODEL
+             ? "not like" : "no word from", other, jl_status_text(status));
+}
+
+int run_pe(int pe, const struct model *model, const struct options *options,
+           jl_chan **to, jl_chan **from)
+{
+    int M = model->M, cap = JL_PAR_BUF(M, model->n, model->m), status;
+    unsigned char *owner = calloc((size_t)M, 1);
+    unsigned char *buf = malloc((size_t)cap);
+    int *mode_status = calloc((size_t)M, sizeof *mode_status);
+    jl_real *z = calloc((size_t)model->m, sizeof *z);
+    jl_par_config config;
+    struct bank bank;
+    jl_par par;
+
+    if (owner == NULL || buf == NULL || mode_status == NULL || z == NULL
+        || bank_open(&bank, model, options->form) != 0) {
+        status = JL_ENOMEM;
+    } else {
+        jl_par_deal(owner, M, options->pes);
+        memset(&config, 0, sizeof config);
+        config.pe = pe;
+        config.npe = options->pes;
+        config.owner = owner;
+        config.to = to;
+        config.from = from;
+        config.to_host = to[options->pes];
+        config.from_host = from[options->pes];
+        config.prepare = bank_prepare;
+        config.context = &bank;
+        config.fingerprint = run_fingerprint(model, options);
+        config.start_us = options->start_us;
+        config.timeout_us = options->timeout_us;
+        status = jl_par_init(&par, &bank.imm, &config, buf, cap, mode_status,
+                             z);
+        if (status == JL_OK)
+            status = jl_par_serve(&par, bank.scratch);
+        if (status != JL_OK)
+            pe_failed(pe, &par, status);
+        bank_close(&bank);
+    }
+    free(owner);
+    free(buf);
+    free(mode_status);
+    free(z);
+    return status;
+}
