@@ -8,6 +8,7 @@
 #include <fcntl.h>
 #include <sched.h>
 
+#include "jumplink/config.h"
 #include "private_net.h"
 
 #define DATA TOP_DIR "/sim/data/"
@@ -16,6 +17,7 @@
 #define FLIGHT "--z", "east_m,north_m"
 #define BY_HAND "--pes", "2", "--lcm-url", URL, PATIENTLY
 #define PATIENTLY "--timeout", "20"     /* on a machine that is busy */
+#define IN_VAIN "--start", "1.5"        /* where somebody does not come */
 
 static char data[400], two[400], eight[400], endless[400];
 static char *serial;            /* the estimates of data by two */
@@ -149,42 +151,81 @@ static void test_network_two_runs_at_once(void **state)
     check_nobody_left();
 }
 
+/* --timeout is for answers, not for the others to be started. */
+static void test_network_waits_for_the_others(void **state)
+{
+    struct program host, pe;
+
+    (void)state;
+    needs_private_net();
+    program_start(&host, "host", two, data, FLIGHT, BY_HAND, "--timeout",
+                  "0.2");
+    program_start(&pe, "pe", "--pe", "0", "--model", two, BY_HAND,
+                  "--timeout", "0.2");
+    program_end(&host, 2);
+    program_end(&pe, 0);
+    if (host.status != -1 || host.err[0] != '\0')
+        program_fail(&host, "still waiting for PE1");
+    if (pe.status != -1 || pe.err[0] != '\0')
+        program_fail(&pe, "still waiting for PE1");
+    program_free(&host);
+    program_free(&pe);
+    check_nobody_left();
+}
+
 /* --- wrong PEs ----------------------------------------------------------- */
 
+static void end_three(struct program *p)
+{
+    int i;
+
+    for (i = 0; i < 3; i++)
+        program_end(&p[i], PROGRAM_LIMIT);
+}
+
+static void free_three(struct program *p)
+{
+    int i;
+
+    for (i = 0; i < 3; i++)
+        program_free(&p[i]);
+    check_nobody_left();
+}
+
+#define DIFFERENT "different models, filters or forms"
+
 /* A host and two PEs of which the second has other arguments: all refuse. */
-static void check_mismatch(const char *what, const char *model,
-                           const char *form)
+static void check_mismatch_told(const char *const *told)
 {
     struct program p[3];
-    int i;
 
     start(&p[0], 'h', "bad");
     start(&p[1], '0', "bad");
-    program_start(&p[2], "pe", "--pe", "1", "--model", model, BY_HAND, "--run",
-                  "bad", "--form", form);
-    for (i = 0; i < 3; i++)
-        program_end(&p[i], PROGRAM_LIMIT);
-    check_refused(&p[0], 1, what);
-    check_refused(&p[1], 1, what);
-    check_refused(&p[2], 1, "PE1");
-    for (i = 0; i < 3; i++)
-        program_free(&p[i]);
+    program_start_file(&p[2], JUMPLINK, NULL, told);
+    end_three(p);
+    check_refused(&p[0], 1, "does not start|" DIFFERENT);
+    check_refused(&p[1], 1, "PE0: not like PE1: |" DIFFERENT);
+    check_refused(&p[2], 1, "PE1: not like PE0: |" DIFFERENT);
+    free_three(p);
 }
 
-static void test_network_different_models_are_refused(void **state)
+#define check_mismatch(...) \
+    check_mismatch_told((const char *const[]){ \
+        "pe", "--pe", "1", BY_HAND, "--run", "bad", __VA_ARGS__, NULL })
+
+static void test_network_different_pes_are_refused(void **state)
 {
     (void)state;
     needs_private_net();
-    check_mismatch("different model", eight, "joseph");
-    check_mismatch("different", two, "standard");
-    check_nobody_left();
+    check_mismatch("--model", eight);
+    check_mismatch("--model", two, "--form", "standard");
+    check_mismatch("--model", two, "--filter", "kf", "--mode", "1");
 }
 
 /* The host has another model than both PEs. */
 static void test_network_host_with_another_model(void **state)
 {
     struct program p[3];
-    int i;
 
     (void)state;
     needs_private_net();
@@ -192,73 +233,159 @@ static void test_network_host_with_another_model(void **state)
     start(&p[1], '1', "host");
     program_start(&p[2], "host", eight, data, FLIGHT, BY_HAND, "--run",
                   "host");
-    for (i = 0; i < 3; i++)
-        program_end(&p[i], PROGRAM_LIMIT);
-    check_refused(&p[2], 1, "different model");
-    for (i = 0; i < 3; i++)
-        program_free(&p[i]);
-    check_nobody_left();
+    end_three(p);
+    check_refused(&p[2], 1, "does not start|" DIFFERENT);
+    free_three(p);
 }
 
-/* PE1 is not there: the host, and PE0, end by themselves. */
-static void test_network_missing_pe(void **state)
+/* The program for the other type of number. */
+static const char *other_jumplink(void)
 {
-    struct program host, pe;
+    static char path[400];
+
+    if (JL_REAL_FLOAT)
+        snprintf(path, sizeof path, "%.*s",
+                 (int)(strlen(JUMPLINK) - strlen("_f32")), JUMPLINK);
+    else
+        snprintf(path, sizeof path, "%s_f32", JUMPLINK);
+    return path;
+}
+
+/* Says why it fails, and then that datagrams of another kind came. */
+static void check_hint(const struct program *p, const char *why)
+{
+    const char *hint = strstr(p->err, "\njumplink: LCM: ");
+
+    if (p->status != 1 || p->out[0] != '\0' || p->seconds > LEAVING
+        || strncmp(p->err, "jumplink: ", 10) != 0 || hint == NULL
+        || strchr(p->err, '\n') != hint
+        || strchr(hint + 1, '\n') != p->err + strlen(p->err) - 1
+        || strstr(p->err, why) == NULL || strstr(p->err, why) > hint
+        || strstr(hint, "datagrams were refused") == NULL
+        || strstr(hint, "another type of number") == NULL)
+        program_fail(p, why);
+}
+
+static void test_network_pe_with_another_type_of_number(void **state)
+{
+    struct program p[3];
 
     (void)state;
     needs_private_net();
-    program_start(&host, "host", two, data, FLIGHT, BY_HAND, "--timeout",
-                  "0.5");
-    program_start(&pe, "pe", "--pe", "0", "--model", two, BY_HAND,
-                  "--timeout", "0.5");
+    program_start(&p[0], "host", two, data, FLIGHT, BY_HAND, "--start", "3");
+    program_start(&p[1], "pe", "--pe", "0", "--model", two, BY_HAND, "--start",
+                  "3");
+    program_start_file(&p[2], other_jumplink(), NULL, (const char *const[]){
+                       "pe", "--pe", "1", "--model", two, BY_HAND, "--start",
+                       "3", NULL });
+    end_three(p);
+    check_hint(&p[0], "the run does not start");
+    check_hint(&p[1], "PE0: no word from PE1");
+    check_hint(&p[2], "PE1: no word from PE0");
+    free_three(p);
+}
+
+/* A PE is not there: host and the other PE, which names it, end. */
+static void check_missing(const char *there, const char *words)
+{
+    struct program host, pe;
+
+    program_start(&host, "host", two, data, FLIGHT, BY_HAND, IN_VAIN);
+    program_start(&pe, "pe", "--pe", there, "--model", two, BY_HAND, IN_VAIN);
     program_end(&host, PROGRAM_LIMIT);
     program_end(&pe, PROGRAM_LIMIT);
     check_refused(&host, 1, "does not start");
-    check_refused(&pe, 1, "PE0");
+    check_refused(&pe, 1, words);
+    assert_true(host.seconds < LEAVING);
+    assert_true(pe.seconds < LEAVING);
     program_free(&host);
     program_free(&pe);
     check_nobody_left();
 }
 
+static void test_network_missing_pe(void **state)
+{
+    (void)state;
+    needs_private_net();
+    check_missing("0", "PE0: no word from PE1");
+    check_missing("1", "PE1: no word from PE0");
+}
+
+static void test_network_host_alone(void **state)
+{
+    (void)state;
+    needs_private_net();
+    run_jumplink("host", two, data, FLIGHT, BY_HAND, IN_VAIN);
+    check_refused(&ran, 1, "does not start");
+    assert_true(ran.seconds < LEAVING);
+}
+
 /* --- a PE that dies ------------------------------------------------------ */
 
-/* Kill PE `which` of a filter in mid-run. */
-static void check_killed(const char *which, int number)
+/* How often a process has waited for something. */
+static long waits(pid_t pid)
+{
+    static const char name[] = "voluntary_ctxt_switches:";
+    char path[60], line[200];
+    long count = 0;
+    FILE *stream;
+
+    snprintf(path, sizeof path, "/proc/%ld/status", (long)pid);
+    stream = fopen(path, "r");
+    while (stream != NULL && fgets(line, sizeof line, stream) != NULL)
+        if (strncmp(line, name, sizeof name - 1) == 0)
+            count = atol(line + sizeof name - 1);
+    if (stream != NULL)
+        fclose(stream);
+    return count;
+}
+
+/* A PE of the program, in the midst of its work: it has waited for more
+ * messages than there are at the start. */
+static pid_t working_pe(const struct program *p, const char *which)
+{
+    double deadline = p->began + PROGRAM_LIMIT;
+    char words[20];
+    pid_t pid = 0;
+
+    snprintf(words, sizeof words, " pe --pe %s ", which);
+    while ((program_find(words, scratch_dir, &pid) == 0 || waits(pid) < 500)
+           && program_now() < deadline)
+        program_sleep(0.01);
+    assert_true(program_now() < deadline);
+    return pid;
+}
+
+/* Send PE `which` of a filter a signal in mid-run: one line, with `words`, and
+ * nothing left. */
+static void check_pe_ends(const char *which, int number, const char *timeout,
+                          const char *words)
 {
     struct program p;
-    char pe[20], out[400], name[8];
-    pid_t pid = 0;
+    char out[400];
     int before = scratch_count();
-    double killed;
+    double signalled;
 
-    snprintf(pe, sizeof pe, " pe --pe %s ", which);
-    snprintf(name, sizeof name, "PE%s", which);
     keep(out, scratch_path("killed.csv"));
-    program_start(&p, "filter", eight, endless, "--port", "lcm", "--out", out);
-    while (program_find(pe, scratch_dir, &pid) == 0
-           && program_now() < p.began + 10)
-        program_sleep(0.01);
-    program_sleep(0.5);
-    assert_true(pid > 0);
-    kill(pid, number);
-    killed = program_now();
+    program_start(&p, "filter", eight, endless, "--port", "lcm", "--out", out,
+                  "--timeout", timeout);
+    kill(working_pe(&p, which), number);
+    signalled = program_now();
     program_end(&p, PROGRAM_LIMIT);
-    assert_int_equal(p.status, 1);
-    assert_true(program_now() - killed < LEAVING);
-    assert_string_equal(p.out, "");
-    if (number == SIGKILL && strstr(p.err, name) == NULL)
-        program_fail(&p, name);
+    check_refused(&p, 1, words);
+    assert_true(program_now() - signalled < LEAVING);
     assert_int_equal(scratch_count(), before);
     program_free(&p);
     check_nobody_left();
 }
 
+/* This is seen, and does not take until the timeout. */
 static void test_network_killed_pe(void **state)
 {
     (void)state;
-    check_killed("0", SIGKILL);
-    check_killed("1", SIGKILL);
-    check_killed("3", SIGKILL);
+    check_pe_ends("0", SIGKILL, "20", "PE0 was ended by signal 9");
+    check_pe_ends("1", SIGKILL, "20", "PE1 was ended by signal 9");
+    check_pe_ends("3", SIGKILL, "20", "PE3 was ended by signal 9");
 }
 
 /* One that only stops answering is not waited for longer than the timeout,
@@ -266,7 +393,7 @@ static void test_network_killed_pe(void **state)
 static void test_network_stopped_pe(void **state)
 {
     (void)state;
-    check_killed("2", SIGSTOP);
+    check_pe_ends("2", SIGSTOP, "3", "no word from PE2");
 }
 
 /* The PEs do not outlive a program that is killed. */
@@ -277,11 +404,8 @@ static void test_network_killed_filter(void **state)
 
     (void)state;
     program_start(&p, "filter", eight, endless, "--port", "lcm", "--out",
-                  scratch_path("killed.csv"));
-    while (program_find(" pe --pe 3 ", scratch_dir, NULL) == 0
-           && program_now() < p.began + 10)
-        program_sleep(0.01);
-    program_sleep(0.2);
+                  scratch_path("killed.csv"), PATIENTLY);
+    (void)working_pe(&p, "3");
     kill(p.pid, SIGKILL);
     program_end(&p, PROGRAM_LIMIT);
     assert_int_equal(p.status, 128 + SIGKILL);
@@ -394,6 +518,12 @@ static void test_network_wrong_use(void **state)
     refused("MODEL.json and DATA.csv", "host", two);
     refused("--pes and --lcm-url", "host", two, data);
     refused("--port", "host", two, data, BY_HAND, "--port", "loop");
+    refused("--run 'a b'", "host", two, data, BY_HAND, "--run", "a b");
+    refused("--run", "pe", "--pe", "0", "--model", two, BY_HAND, "--run",
+            "seventeen_letters");
+    refused("--start 0", "host", two, data, BY_HAND, "--start", "0");
+    refused("--lcm-url foo", "host", two, data, "--pes", "2", "--lcm-url",
+            "foo");
     refused("--mode", "host", two, data, BY_HAND, "--mode", "1");
     refused("unexpected 'x'", "pe", "x");
     refused("--model", "pe", "--pe", "0", BY_HAND);
@@ -408,20 +538,34 @@ static void test_network_wrong_use(void **state)
             "kf");
 }
 
+/* A host says so before it waits for anybody. */
+static void test_network_host_with_a_misfit(void **state)
+{
+    (void)state;
+    refused("z.csv:1: |2 measurements", "host",
+            TOP_DIR "/tests/golden/imm/cvca3/model.json",
+            TOP_DIR "/tests/golden/imm/bank12/z.csv", BY_HAND);
+    assert_true(ran.seconds < LEAVING);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_network_by_hand_in_any_order),
         cmocka_unit_test(test_network_two_runs_at_once),
-        cmocka_unit_test(test_network_different_models_are_refused),
+        cmocka_unit_test(test_network_waits_for_the_others),
+        cmocka_unit_test(test_network_different_pes_are_refused),
         cmocka_unit_test(test_network_host_with_another_model),
+        cmocka_unit_test(test_network_pe_with_another_type_of_number),
         cmocka_unit_test(test_network_missing_pe),
+        cmocka_unit_test(test_network_host_alone),
         cmocka_unit_test(test_network_killed_pe),
         cmocka_unit_test(test_network_stopped_pe),
         cmocka_unit_test(test_network_killed_filter),
         cmocka_unit_test(test_network_falls_back_to_the_machines_own),
         cmocka_unit_test(test_network_without_multicast),
         cmocka_unit_test(test_network_wrong_use),
+        cmocka_unit_test(test_network_host_with_a_misfit),
     };
 
     return cmocka_run_group_tests(tests, setup, teardown);

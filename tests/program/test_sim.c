@@ -54,14 +54,16 @@ static const char *cell(const char *csv, int line, const char *heading)
     return text;
 }
 
-/* Each PE says ready and is told to stop, and PE0 passes both on; a row goes
- * to the PEs with modes and comes back; but for the first, which starts the
- * filter, every two of them exchange their modes. */
+/* The other PEs tell PE0 that they are ready, PE0 tells them and the host that
+ * all are; the host tells PE0 to stop, PE0 the others; a row goes to the PEs
+ * with modes and comes back; but for the first, which starts the filter, every
+ * two of them exchange their modes. */
 static long messages(long rows, long modes, long pes)
 {
     long active = modes < pes ? modes : pes;
 
-    return 2 * pes + rows * (1 + active) + (rows - 1) * active * (active - 1);
+    return (pes - 1) + pes + pes + rows * (1 + active)
+        + (rows - 1) * active * (active - 1);
 }
 
 static void check_table(const char *csv, int line, const char *model,
@@ -284,6 +286,39 @@ static void test_sim_refuses(void **state)
     assert_int_equal(scratch_count(), before);
 }
 
+/* The folder's name is a file's: known before any work. */
+static void test_sim_out_is_a_file(void **state)
+{
+    const char *file = scratch_write("file", "kept");
+    int before = scratch_count();
+    char *text;
+
+    (void)state;
+    sim_refused(1, "/file|Not a directory", "--data", data, "--model", two,
+                "--port", "loop", "--out", file);
+    text = program_file(file);
+    assert_string_equal(text, "kept");
+    free(text);
+    assert_int_equal(scratch_count(), before);
+}
+
+/* Files are named after the models: two of one name would share them. */
+static void test_sim_two_models_of_one_name(void **state)
+{
+    char twin[400], out[400];
+
+    (void)state;
+    keep(out, scratch_path("same"));
+    scratch_must(mkdir(scratch_path("other"), 0777) == 0, "mkdir");
+    keep(twin, program_copy("other/two_modes.json", eight));
+    sim_refused(2, "--model|other/two_modes.json", "--data", data, "--model",
+                two, "--model", twin, "--port", "loop", "--out", out);
+    sim_refused(2, "--model|two_modes.json", "--data", data, "--model", two,
+                "--model", eight, "--model", two, "--port", "loop", "--out",
+                out);
+    assert_int_not_equal(access(out, F_OK), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -292,6 +327,8 @@ int main(void)
         cmocka_unit_test(test_sim_recognised_positions_pay),
         cmocka_unit_test(test_sim_one_way_only),
         cmocka_unit_test(test_sim_refuses),
+        cmocka_unit_test(test_sim_out_is_a_file),
+        cmocka_unit_test(test_sim_two_models_of_one_name),
     };
 
     return cmocka_run_group_tests(tests, setup, scratch_teardown);
