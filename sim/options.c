@@ -152,6 +152,8 @@ int options_take(struct options *o, int c, char *const *argv)
     case ':':
         return misuse(o->command, "%s needs a value", argv[optind - 1]);
     default:
+        if (optopt > 0 && optopt < 256 && argv[optind - 1][1] != '-')
+            return misuse(o->command, "unknown option -%c", optopt);
         return misuse(o->command, "unknown option %s", argv[optind - 1]);
     }
 }

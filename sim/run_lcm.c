@@ -38,7 +38,7 @@ static void become_pe(int pe, const char *url, const char *run,
                       const struct model *model,
                       const struct options *options, pid_t parent)
 {
-    char which[16], pes[16], mode[16], timeout[32];
+    char which[16], pes[16], mode[16], timeout[32], wait[32];
     const char *argv[24];
     int n = 0;
 
@@ -46,6 +46,7 @@ static void become_pe(int pe, const char *url, const char *run,
     snprintf(pes, sizeof pes, "%d", options->pes);
     snprintf(timeout, sizeof timeout, "%.6f",
              (double)options->timeout_us * 1e-6);
+    snprintf(wait, sizeof wait, "%.6f", (double)options->start_us * 1e-6);
     argv[n++] = "jumplink";
     argv[n++] = "pe";
     argv[n++] = "--pe";
@@ -60,6 +61,8 @@ static void become_pe(int pe, const char *url, const char *run,
     argv[n++] = run;
     argv[n++] = "--timeout";
     argv[n++] = timeout;
+    argv[n++] = "--start";
+    argv[n++] = wait;
     argv[n++] = "--form";
     argv[n++] = options->form == &jl_kf_joseph ? "joseph" : "standard";
     if (options->kf) {

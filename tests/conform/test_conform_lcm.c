@@ -17,7 +17,8 @@
 
 #define URL "udpm://239.255.76.67:7667?ttl=0"
 #define CHILD_SECONDS 30U
-#define LINGER_US 10000000L     /* losses may take several repetitions */
+#define LINGER_US 1000000L
+#define LOSSY_LINGER_US 10000000L       /* several repetitions, backing off */
 
 static int net_errno;           /* why there is no network; 0: there is one */
 static jl_lcm *lcm;             /* this process's node                      */
@@ -115,7 +116,7 @@ static pid_t start(int node, int nodes, conform_body body)
     if (child == 0) {
         join(node, nodes);
         body(node);
-        jl_lcm_close(lcm, LINGER_US);
+        jl_lcm_close(lcm, drop > 0 ? LOSSY_LINGER_US : LINGER_US);
         _exit(conform_failures() != 0);
     }
     return child;
