@@ -22,10 +22,11 @@ static const char help[] =
     "positions recognised, for each model; compares with the serial\n"
     "filter; writes a table, CSV and plots.\n\n"
     "  --data FILE       the record, with true velocities v_east_mps and\n"
-    "                    v_north_mps (default\n"
+    "                    v_north_mps (default, in the source folder:\n"
     "                    sim/data/carrier_held_1hz.csv)\n"
-    "  --model FILE      a model; may be given several times (default\n"
-    "                    sim/data/two_modes.json and eight_modes.json)\n"
+    "  --model FILE      a model; may be given several times (default, in\n"
+    "                    the source folder: sim/data/two_modes.json and\n"
+    "                    eight_modes.json)\n"
     "  -o, --out DIR     where results go (default build/sim)\n"
     "  --port lcm|loop   processes over LCM (default), or threads that\n"
     "                    take turns\n"
@@ -124,6 +125,18 @@ static int all_runs(struct flight_report *report, struct model *models,
     return status;
 }
 
+/* A flight without a single position is no use. */
+static int has_position(const struct data_file *data)
+{
+    long i;
+
+    for (i = 0; i < data->rows * data->m; i++)
+        if (!isnan((double)data->z[i]))
+            return 1;
+    complain(data->path, 0, NULL, "there is no position in any row");
+    return 0;
+}
+
 /* Files are named after the models. */
 static int has_twin(const struct model *models, int i)
 {
@@ -156,6 +169,8 @@ static int sim(const char *data_path, const char *const *paths, int count,
     columns.extra = FLIGHT_TRUTH;
     if (data_read(&data, data_path, &columns) != 0)
         return 2;
+    if (!has_position(&data))
+        status = 2;
     for (i = 0; i < count && status == 0; i++)
         if (model_read(&models[i], paths[i]) != 0)
             status = 2;

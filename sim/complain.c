@@ -3,6 +3,8 @@
 #include <stdarg.h>
 #include <stdio.h>
 
+#include "progress.h"
+
 int complain(const char *file, long line, const char *field,
              const char *format, ...)
 {
@@ -24,6 +26,7 @@ int complain(const char *file, long line, const char *field,
     for (p = text; *p != '\0'; p++)     /* UTF-8 passes, controls do not */
         if ((unsigned char)*p < ' ' || *p == 127)
             *p = '?';
+    progress_clear();
     fprintf(stderr, "%s\n", text);
     return -1;
 }

@@ -17,7 +17,8 @@ struct chosen {
 
 /* --- choosing columns -------------------------------------------------- */
 
-static int unknown_column(const struct csv *csv, const char *name)
+static int unknown_column(const struct csv *csv, const char *name,
+                          const char *hint)
 {
     char list[400];
     int i;
@@ -26,7 +27,8 @@ static int unknown_column(const struct csv *csv, const char *name)
     for (i = 0; i < csv->columns && used < sizeof list; i++)
         used += (size_t)snprintf(list + used, sizeof list - used, "%s%s",
                                  i == 0 ? "" : ", ", csv->name[i]);
-    return complain(csv->path, 1, name, "no such column; there is: %s", list);
+    return complain(csv->path, 1, name, "no such column%s; there is: %s", hint,
+                    list);
 }
 
 /* The columns named by list, "a,b": *column [*count].  Returns 0 or -1. */
@@ -43,7 +45,7 @@ static int find_listed(const struct csv *csv, const char *list, int **column,
         int found = csv_find(csv, name);
 
         if (found < 0)
-            error = unknown_column(csv, name);
+            error = unknown_column(csv, name, "");
         for (i = 0; i < *count; i++)
             if (error == 0 && (*column)[i] == found)
                 error = complain(csv->path, 1, name, "chosen twice");
@@ -69,7 +71,7 @@ static int find_z(const struct csv *csv, int **column, int *count)
     for (i = 0; i < csv->columns; i++)
         there += is_z(csv->name[i]);
     if (there == 0)
-        return unknown_column(csv, "z0");
+        return unknown_column(csv, "z0", " (--z A,B chooses)");
     *column = calloc((size_t)there, sizeof **column);
     if (*column == NULL)
         return complain(csv->path, 0, NULL, "out of memory");
@@ -95,7 +97,7 @@ static int choose(struct data_file *data, struct chosen *chosen,
         time = csv_find(csv, "t_s") >= 0 ? "t_s" : "k";
     chosen->time = csv_find(csv, time);
     if (chosen->time < 0)
-        return unknown_column(csv, time);
+        return unknown_column(csv, time, "");
     data->time_name = strdup(time);
     if (data->time_name == NULL)
         return complain(csv->path, 0, NULL, "out of memory");
@@ -369,24 +371,4 @@ void data_free(struct data_file *data)
     free(data->run);
     free(data->line);
     memset(data, 0, sizeof *data);
-}
-
-int data_has(const char *path, const char *columns)
-{
-    struct csv csv;
-    char *copy = strdup(columns), *rest = copy, *name;
-    int has = 1;
-
-    if (copy == NULL)
-        return complain(path, 0, NULL, "out of memory");
-    if (csv_open(&csv, path) != 0) {
-        free(copy);
-        return -1;
-    }
-    while ((name = strsep(&rest, ",")) != NULL)
-        if (csv_find(&csv, name) < 0)
-            has = 0;
-    csv_close(&csv);
-    free(copy);
-    return has;
 }

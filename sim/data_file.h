@@ -34,8 +34,4 @@ int data_read(struct data_file *data, const char *path,
               const struct data_columns *columns);
 void data_free(struct data_file *data);
 
-/* 1 if the header of the file has all the named columns ("a,b"), 0 if not,
- * -1 (and a message) if it cannot be read. */
-int data_has(const char *path, const char *columns);
-
 #endif

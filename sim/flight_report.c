@@ -1,5 +1,6 @@
 #include "flight_report.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,7 +46,12 @@ void flight_model_name(char *name, int size, const struct model *model)
     const char *base = strrchr(model->path, '/');
 
     base = base == NULL ? model->path : base + 1;
-    snprintf(name, (size_t)size, "%.*s", (int)strcspn(base, "."), base);
+    snprintf(name, (size_t)size, "%s", base);
+    if (strlen(name) > 5 && strcmp(name + strlen(name) - 5, ".json") == 0)
+        name[strlen(name) - 5] = '\0';
+    for (; *name != '\0'; name++)       /* it goes into file and column names */
+        if (!isalnum((unsigned char)*name) && strchr("_-.", *name) == NULL)
+            *name = '_';
 }
 
 void flight_run_name(struct flight_run *run, const struct model *model,
@@ -164,8 +170,8 @@ static void print_table(const struct flight_report *r, FILE *out)
         long steps = estimates_times(&run->e, &median, &p99);
 
         fprintf(out, "%-12s %-10s %8.2f %6ld %8.1f %8.1f %7.1f %8lu %6lu "
-                "%s\n", run->model, run->positions, rms_error(run, r->data), steps,
-                median, p99, run->serial_us, run->traffic.messages,
+                "%s\n", run->model, run->positions, rms_error(run, r->data),
+                steps, median, p99, run->serial_us, run->traffic.messages,
                 run->traffic.resent, run->same ? "yes" : "NO");
     }
 }

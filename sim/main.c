@@ -1,6 +1,8 @@
 /* jumplink: the subcommands by their names. */
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "command.h"
 #include "jumplink.h"
@@ -31,10 +33,23 @@ static void help(FILE *out)
     fprintf(out, "\njumplink COMMAND --help says more; jumplink --version.\n");
 }
 
+/* A program may be started with 0, 1 or 2 closed; a file or pipe must not get
+ * one of these numbers by chance. */
+static void fill_standard(void)
+{
+    int fd;
+
+    do
+        fd = open("/dev/null", O_RDWR);
+    while (fd >= 0 && fd <= 2);
+    close(fd);
+}
+
 int main(int argc, char **argv)
 {
     size_t i;
 
+    fill_standard();
     if (argc < 2) {
         help(stderr);
         return 2;

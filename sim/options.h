@@ -72,7 +72,8 @@ struct options {
 #define RUN_HELP \
     "  --run NAME        name of the run, if several share a network: 1 to\n" \
     "                    16 letters, digits or _ (default jumplink)\n" \
-    "  --start S         longest wait for the others to start (default 60)\n" \
+    "  --start S         longest wait for PEs that are not there yet\n" \
+    "                    (default 60; a PE waits for its host without end)\n" \
     "  --lcm-url URL     LCM address, such as\n" \
     "                    udpm://239.255.76.67:7667?ttl=1\n"
 

@@ -8,12 +8,17 @@
 static const char *name = "";
 static double drawn_us;
 
+void progress_clear(void)
+{
+    if (drawn_us > 0)
+        fprintf(stderr, "\r\033[K");
+    drawn_us = 0;
+}
+
 void progress_begin(const char *what)
 {
-    if (isatty(STDERR_FILENO))
-        fprintf(stderr, "\r\033[K");
+    progress_clear();
     name = what == NULL ? "" : what;
-    drawn_us = 0;
 }
 
 void progress(long done, long total)

@@ -5,6 +5,9 @@
 /* Name the work that begins; NULL: over, wipe the line. */
 void progress_begin(const char *what);
 
+/* Wipe the line, if there is one, for something else to be said. */
+void progress_clear(void);
+
 /* done of total; draws at most ten times a second. */
 void progress(long done, long total);
 

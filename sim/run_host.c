@@ -71,8 +71,9 @@ static int host_row(struct estimates *e, long row,
     if (status == JL_OK)
         status = estimate->status;
     if (status == JL_OK)
-        estimates_note(e, row, estimate->x, estimate->P, estimate->mu, estimate->loglik,
-             is_start ? (double)NAN : clock_us() - before);
+        estimates_note(e, row, estimate->x, estimate->P, estimate->mu,
+                       estimate->loglik,
+                       is_start ? (double)NAN : clock_us() - before);
     return status;
 }
 

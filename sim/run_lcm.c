@@ -1,5 +1,6 @@
 /* A parallel run over LCM: each PE a process, this one the host. */
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -12,6 +13,7 @@
 #include "clock.h"
 #include "complain.h"
 #include "lcm_net.h"
+#include "progress.h"
 #include "run.h"
 
 /* How long PEs may take to leave after the end of a run, and to say what was
@@ -90,14 +92,12 @@ static int start(struct crew *crew, const char *url, const char *run,
     memset(crew, 0, sizeof *crew);
     crew->pes = options->pes;
     for (pe = 0; pe < crew->pes; pe++) {
-        if (pipe(ends) != 0)
+        if (pipe2(ends, O_CLOEXEC) != 0)
             break;
         crew->pe[pe].pid = fork();
         if (crew->pe[pe].pid == 0) {
             dup2(ends[1], STDOUT_FILENO);
             dup2(ends[1], STDERR_FILENO);
-            close(ends[0]);
-            close(ends[1]);
             become_pe(pe, url, run, model, options, parent);
         }
         close(ends[1]);
@@ -224,6 +224,7 @@ int run_lcm(struct estimates *e, struct traffic *traffic,
     bad = dismiss(&crew, traffic, status == JL_OK ? LEAVE_US : FAIL_US);
     if (status != JL_OK && !run_is_channels(status))
         return run_failed(data, row, status);
+    progress_clear();
     if (bad)
         fprintf(stderr, "jumplink: %s\n", crew.complaint);
     else if (status != JL_OK)

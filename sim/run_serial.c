@@ -35,7 +35,8 @@ int run_serial(struct estimates *e, const struct model *model,
             status = jl_imm_step(imm, meas.z, bank.scratch);
         if (status == JL_OK || status == JL_STARTED)
             estimates_note(e, row, imm->xhat, imm->Phat, imm->mu, imm->loglik,
-                 status == JL_OK ? clock_us() - before : (double)NAN);
+                           status == JL_OK ? clock_us() - before
+                                           : (double)NAN);
         if (status == JL_STARTED)
             status = JL_OK;
         progress(row + 1, data->rows);

@@ -149,12 +149,6 @@ static void test_data_chosen_columns(void **state)
     bad_data_as(path, &bad[2], "bad.csv:1: truth: ", "there is: t,");
     bad_data_as(path, &bad[3], "bad.csv:1: east_m: ", "twice");
     bad_data_as(path, &bad[4], "bad.csv:2: up: ", "'x' is not a number");
-
-    assert_int_equal(data_has(path, "v,t"), 1);
-    assert_int_equal(data_has(path, "v,w"), 0);
-    capture_begin();
-    assert_int_equal(data_has(scratch_path("nothing.csv"), "v"), -1);
-    check_line(capture_end(), "nothing.csv", "", "No such file");
 }
 
 static void test_data_spellings_that_are_fine(void **state)
