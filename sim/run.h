@@ -45,8 +45,8 @@ jl_u32 run_fingerprint(const struct model *model,
 int run_max_len(const struct model *model);
 
 /* PE pe's part, until the host says stop; to and from have options->pes + 1
- * entries, of which the last is the host's.  Returns a code of base.h, and if
- * a channel failed, after a line that says whose. */
+ * entries, of which the last is the host's.  Returns JL_OK, or a code of base.h
+ * after a line that says why. */
 int run_pe(int pe, const struct model *model, const struct options *options,
            jl_chan **to, jl_chan **from);
 

@@ -19,7 +19,8 @@ int run_failed(const struct data_file *data, long row, int status)
 {
     if (row < 0)
         complain("PEs", 0, NULL, "the run does not start: %s%s",
-                 status == JL_EMODEL ? "" : "no word from PE0: ",
+                 run_is_channels(status) && status != JL_EMODEL
+                 ? "no word from PE0: " : "",
                  jl_status_text(status));
     else if (run_is_channels(status))
         complain("PEs", 0, NULL, "the run ends at %s:%ld: %s", data->path,

@@ -56,6 +56,7 @@ int run_pe(int pe, const struct model *model, const struct options *options,
 
     if (owner == NULL || buf == NULL || mode_status == NULL || z == NULL
         || bank_open(&bank, model, options->form) != 0) {
+        complain(model->path, 0, NULL, "no memory for its filter");
         status = JL_ENOMEM;
     } else {
         jl_par_deal(owner, M, options->pes);

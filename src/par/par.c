@@ -162,7 +162,7 @@ static int ready(jl_par *par)
 
 /* --- serve --------------------------------------------------------------- */
 
-/* Pass a message of the host's on, from PE0 to PEs first .. last-1. */
+/* Pass a message of the host's on, from PE0 to PEs 1 .. last-1. */
 static int pass_on(jl_par *par, int len, int last)
 {
     int pe, status = JL_OK;

@@ -2,11 +2,16 @@
 #include "close.h"
 #include "scratch.h"
 
+#include <fcntl.h>
 #include <signal.h>
+#include <stdlib.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
+#include "complain.h"
 #include "out_file.h"
 #include "plot.h"
+#include "progress.h"
 
 /* --- files ------------------------------------------------------------- */
 
@@ -287,6 +292,49 @@ static void test_plot_that_fails(void **state)
     unlink(scratch_path("p.gp"));
 }
 
+/* --- progress ------------------------------------------------------------ */
+
+/* What a terminal shows of work, of a complaint in its midst, and of its end: */
+static void test_progress_on_a_terminal(void **state)
+{
+    int master = posix_openpt(O_RDWR | O_NOCTTY), saved = dup(STDERR_FILENO);
+    char said[400] = "";
+    int terminal;
+    ssize_t n;
+
+    (void)state;
+    assert_true(master >= 0 && grantpt(master) == 0 && unlockpt(master) == 0);
+    terminal = open(ptsname(master), O_RDWR | O_NOCTTY);
+    assert_true(terminal >= 0);
+    fflush(stderr);
+    dup2(terminal, STDERR_FILENO);
+    progress_begin("a flight");
+    progress(3, 10);
+    complain("x.csv", 4, NULL, "no");
+    progress_begin(NULL);
+    progress(4, 10);                    /* nothing is under way */
+    fflush(stderr);
+    dup2(saved, STDERR_FILENO);
+    n = read(master, said, sizeof said - 1);
+    close(terminal);
+    close(master);
+    close(saved);
+    assert_true(n > 0);
+    assert_string_equal(said, "\r\033[Ka flight: 3 of 10"
+                        "\r\033[Kjumplink: x.csv:4: no\r\n");
+}
+
+/* Nothing of it in a file or pipe. */
+static void test_progress_elsewhere(void **state)
+{
+    (void)state;
+    capture_begin();
+    progress_begin("a flight");
+    progress(3, 10);
+    progress_begin(NULL);
+    assert_string_equal(capture_end(), "");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -297,7 +345,9 @@ int main(void)
         cmocka_unit_test(test_out_standard_output),
         cmocka_unit_test(test_plot_draws_png_and_svg),
         cmocka_unit_test(test_plot_without_gnuplot),
-        cmocka_unit_test(test_plot_that_fails)
+        cmocka_unit_test(test_plot_that_fails),
+        cmocka_unit_test(test_progress_on_a_terminal),
+        cmocka_unit_test(test_progress_elsewhere)
     };
 
     return cmocka_run_group_tests(tests, scratch_setup, scratch_teardown);
