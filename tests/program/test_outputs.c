@@ -294,7 +294,7 @@ static void test_plot_that_fails(void **state)
 
 /* --- progress ------------------------------------------------------------ */
 
-/* What a terminal shows of work, of a complaint in its midst, and of its end: */
+/* What a terminal shows of work, a complaint in its midst, and its end. */
 static void test_progress_on_a_terminal(void **state)
 {
     int master = posix_openpt(O_RDWR | O_NOCTTY), saved = dup(STDERR_FILENO);
