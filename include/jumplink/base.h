@@ -70,7 +70,9 @@ enum {
     JL_ELENGTH = -21,   /* a frame or message of the wrong length           */
     JL_ECRC = -22,      /* a frame damaged on its way                       */
     JL_EMSG = -23,      /* a message that does not belong here              */
-    JL_EMODEL = -24     /* the PEs were given different models              */
+    JL_EMODEL = -24,    /* the PEs were given different models              */
+    JL_ESILENT = -25,   /* the other end has not been heard for too long    */
+    JL_ECHAIN = -26     /* a chain that an all-reduce cannot serve          */
 };
 
 /* What a code means, in words: "innovation covariance S is not positive

@@ -53,6 +53,11 @@ const char *jl_status_text(int status)
         return "message that does not belong here";
     case JL_EMODEL:
         return "the PEs were given different models, filters or forms";
+    case JL_ESILENT:
+        return "nothing heard from the other end for too long";
+    case JL_ECHAIN:
+        return "the chain is not diag(lambda) + 1 v', which an all-reduce "
+               "needs";
     default:
         return "unknown status";
     }
