@@ -1,5 +1,5 @@
 /* The parallel IMM on port lcm, each PE a process: the serial filter's bits for
- * any number of PEs, and when the network loses datagrams. */
+ * any number of PEs. */
 #include "par_case.h"
 
 #include <signal.h>
@@ -17,7 +17,6 @@ static int is_private;
 struct run {
     int npe, M, sticky;
     const jl_kf_form *form;
-    double drop;
 };
 
 static jl_lcm *join(const struct run *run, int node, jl_chan **to,
@@ -35,8 +34,6 @@ static jl_lcm *join(const struct run *run, int node, jl_chan **to,
     config.number = JL_REAL_OCTETS;
     config.max_len = JL_PAR_MSG(PAR_M, PAR_N, PAR_Z);
     config.slots = 2;
-    config.drop = run->drop;
-    config.seed = 1;
     lcm = jl_lcm_open(&config, &why);
     for (i = 0; lcm != NULL && i <= run->npe; i++) {
         to[i] = jl_lcm_tx(lcm, i);
@@ -95,7 +92,7 @@ static void compare(const struct run *run)
 
 static void test_par_gives_serial_bits_over_lcm(void **state)
 {
-    struct run run = { 0, PAR_M, 0, &jl_kf_joseph, 0 };
+    struct run run = { 0, PAR_M, 0, &jl_kf_joseph };
 
     (void)state;
     if (!is_private)
@@ -105,21 +102,10 @@ static void test_par_gives_serial_bits_over_lcm(void **state)
             compare(&run);
 }
 
-static void test_par_gives_serial_bits_over_a_lossy_lcm(void **state)
-{
-    struct run run = { 3, 5, 0, &jl_kf_joseph, 0.3 };
-
-    (void)state;
-    if (!is_private)
-        skip();
-    compare(&run);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_over_lcm),
-        cmocka_unit_test(test_par_gives_serial_bits_over_a_lossy_lcm),
     };
 
     is_private = private_net_enter() == 0;
