@@ -18,9 +18,12 @@
 #define URL "udpm://239.255.76.67:7667?ttl=0"
 #define CHILD_SECONDS 30U
 #define LINGER_US 1000000L
+#define BEAT_US 20000
+#define SILENCE_US 800000L
 
 static int net_errno;           /* why there is no network; 0: there is one */
 static jl_lcm *lcm;             /* this process's node                      */
+static int watched;             /* all beat, and node 0 listens for it     */
 static char run_name[16];       /* new for each run                         */
 
 static jl_chan *tx(int from, int to)
@@ -90,6 +93,8 @@ static jl_lcm_config config_of(int node, int nodes)
     c.number = JL_REAL_OCTETS;
     c.max_len = lcm_port.max_len;
     c.slots = lcm_port.slots;
+    c.beat_us = watched ? BEAT_US : 0;
+    c.silence_us = watched && node == 0 ? SILENCE_US : 0;
     return c;
 }
 
@@ -238,6 +243,86 @@ static void test_lcm_restart(void **state)
     assert_int_equal(child_failed(child), 0);
 }
 
+/* A node that hangs is missed; one that only waits is not. */
+static void misses_the_other(int pe)
+{
+    (void)pe;
+    EXPECT(jl_lcm_silence(lcm, 1), ==, -1);
+    EXPECT(jl_lcm_silence(lcm, 2), ==, -1);
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, LONG_US), ==, 0);
+    EXPECT(jl_lcm_silence(lcm, 1), >=, 0);
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, LONG_US), ==, 0);
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, JL_FOREVER), ==, JL_ESILENT);
+    EXPECT(jl_chan_send(tx(0, 1), NULL, 0, LONG_US), ==, JL_ESILENT);
+    EXPECT(jl_lcm_silence(lcm, 1), ==, -1);
+}
+
+static void waits_and_hangs(int pe)
+{
+    (void)pe;
+    EXPECT(jl_chan_send(tx(1, 0), NULL, 0, LONG_US), ==, JL_OK);
+    EXPECT(jl_chan_recv(rx(0, 1), NULL, 0, 2 * SILENCE_US), ==, JL_ETIMEOUT);
+    EXPECT(jl_chan_send(tx(1, 0), NULL, 0, LONG_US), ==, JL_OK);
+    raise(SIGSTOP);
+}
+
+static void test_lcm_silence(void **state)
+{
+    pid_t hung;
+
+    (void)state;
+    need_net();
+    watched = 1;
+    new_run();
+    hung = start(1, 2, waits_and_hangs);
+    assert_int_equal(child_failed(start(0, 2, misses_the_other)), 0);
+    kill(hung, SIGKILL);
+    waitpid(hung, NULL, 0);
+    watched = 0;
+}
+
+/* One that was stopped itself blames nobody. */
+static void is_stopped(int pe)
+{
+    (void)pe;
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, LONG_US), ==, 0);
+    raise(SIGSTOP);
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, 2 * SILENCE_US), ==, JL_ETIMEOUT);
+    raise(SIGSTOP);
+    EXPECT(jl_chan_send(tx(0, 1), NULL, 0, LONG_US), ==, JL_OK);
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, LONG_US), ==, 0);
+}
+
+static void waits_for_it(int pe)
+{
+    (void)pe;
+    EXPECT(jl_chan_send(tx(1, 0), NULL, 0, LONG_US), ==, JL_OK);
+    EXPECT(jl_chan_recv(rx(0, 1), NULL, 0, LONG_US), ==, 0);
+    EXPECT(jl_chan_send(tx(1, 0), NULL, 0, LONG_US), ==, JL_OK);
+}
+
+static void test_lcm_stopped_is_not_silence(void **state)
+{
+    pid_t stopped, other;
+    int i, status = 0;
+
+    (void)state;
+    need_net();
+    watched = 1;
+    new_run();
+    stopped = start(0, 2, is_stopped);
+    other = start(1, 2, waits_for_it);
+    for (i = 0; i < 2; i++) {
+        assert_int_equal(waitpid(stopped, &status, WUNTRACED), stopped);
+        assert_true(WIFSTOPPED(status));
+        usleep(2 * SILENCE_US);
+        kill(stopped, SIGCONT);
+    }
+    assert_int_equal(child_failed(stopped), 0);
+    assert_int_equal(child_failed(other), 0);
+    watched = 0;
+}
+
 /* All leave at once when nothing was lost: nobody lingers. */
 static void leave(int pe)
 {
@@ -356,6 +441,8 @@ int main(void)
         cmocka_unit_test(test_conform_lcm),
         cmocka_unit_test(test_lcm_strangers),
         cmocka_unit_test(test_lcm_restart),
+        cmocka_unit_test(test_lcm_silence),
+        cmocka_unit_test(test_lcm_stopped_is_not_silence),
         cmocka_unit_test(test_lcm_close_is_quick),
         cmocka_unit_test(test_lcm_alone),
         cmocka_unit_test(test_lcm_refuses),
