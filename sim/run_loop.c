@@ -29,13 +29,13 @@ static void body(int node, void *context)
             from[i] = jl_loop_rx(job->loop, i, node);
         }
     if (node == pes) {
-        struct run_host host = { to[0], from[0], NULL, NULL };
+        struct run_host host = { to[0], from[0], NULL, NULL, -1 };
         long row;
         int status = run_host(job->e, &row, &host, job->model, job->data,
                               job->options);
 
         job->status = status == JL_OK ? 0
-            : run_failed(job->data, row, status);
+            : run_failed(job->data, row, status, host.failed_pe);
     } else {
         (void)run_pe(node, job->model, job->options, to, from);
     }

@@ -58,6 +58,7 @@ typedef struct jl_estimate {
     jl_real *x;                 /* [n]                                      */
     jl_real *P;                 /* [n,n]                                    */
     jl_real *mu;                /* [M]                                      */
+    int failed_pe;              /* the PE that PE0 gave up; -1: none        */
 } jl_estimate;
 
 /* Octets of the longest message of a filter with M modes, n states and m
@@ -87,7 +88,8 @@ int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,
 /* Receive the answer; x [n], P [n,n], mu [M] of *estimate are the caller's.
  * buf [cap], cap >= JL_PAR_MSG(M, n, 1).
  * Returns JL_OK (look at estimate->status), JL_EMSG, JL_ELENGTH, or the
- * channel's error. */
+ * channel's error; or, when PE0 cannot go on because of another PE, the error
+ * of that channel, with estimate->failed_pe: the run is over. */
 int jl_host_recv(jl_chan *from_pe0, jl_estimate *estimate, int M, int n,
                  unsigned char *buf, int cap, long timeout_us);
 

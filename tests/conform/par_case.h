@@ -206,10 +206,11 @@ static inline int par_pe(int pe, const struct par_shape *shape, jl_chan **to,
     return status;
 }
 
-/* The host's part: feed all measurements, note all answers, stop. */
+/* The host's part: feed all measurements, note all answers, stop.  *blamed as
+ * above, -1 for nobody. */
 static inline int par_host(struct par_trace *trace,
                            const struct par_shape *shape, jl_chan *to,
-                           jl_chan *from)
+                           jl_chan *from, int *blamed)
 {
     unsigned char buf[JL_PAR_MSG(PAR_M, PAR_N, PAR_Z)];
     jl_real x[PAR_N], P[PAR_N * PAR_N], mu[PAR_M], z[PAR_Z];
@@ -227,13 +228,15 @@ static inline int par_host(struct par_trace *trace,
         status = jl_host_send(to, &meas, PAR_Z, buf, sizeof buf, 5000000);
         if (status == JL_OK)
             status = jl_host_recv(from, &estimate, shape->M, PAR_N, buf, sizeof buf,
-                                  5000000);
+                                  60000000);
         if (status == JL_OK && estimate.seq != meas.seq)
             status = JL_EMSG;
         if (status == JL_OK)
             par_note(trace, k, estimate.status, x, P, mu, estimate.loglik,
                      shape->M);
     }
+    if (blamed != NULL)
+        *blamed = estimate.failed_pe;
     return status == JL_OK ? jl_host_stop(to, buf, sizeof buf, 5000000)
                            : status;
 }

@@ -71,7 +71,7 @@ static void compare(const struct par_shape *shape)
     }
     lcm = join(shape, shape->npe, to, from);
     if (lcm != NULL)
-        host = par_host(&trace, shape, to[0], from[0]);
+        host = par_host(&trace, shape, to[0], from[0], NULL);
     jl_lcm_close(lcm, 10000000);
     for (pe = 0; pe < shape->npe; pe++) {
         if (host != JL_OK)

@@ -30,7 +30,7 @@ static void body(int node, void *context)
                            NULL, 0, PAR_ASLEEP_US);
     else if (node == npe)
         run->status[node] = par_host(&run->trace, &run->shape, to[0],
-                                     from[0]);
+                                     from[0], &run->blamed[node]);
     else
         run->status[node] = par_pe(node, &run->shape, to, from,
                                    &run->blamed[node]);
@@ -53,6 +53,7 @@ static void parallel(struct run *run, int slots)
     start(run, slots);
     for (i = 0; i <= run->shape.npe; i++)
         assert_int_equal(run->status[i], JL_OK);
+    assert_int_equal(run->blamed[run->shape.npe], -1);
 }
 
 static void compare(struct run *run, int slots)
@@ -210,7 +211,8 @@ static void test_par_blames_the_dead_and_not_the_relay(void **state)
                         for (pe = 0; pe <= s->npe; pe++)
                             if (pe != s->hangs) {
                                 assert_true(run.status[pe] != JL_OK);
-                                if (pe < s->npe)
+                                if (pe < s->npe || (s->hangs > 0
+                                                    && s->hangs_at > 0))
                                     assert_int_equal(run.blamed[pe],
                                                      s->hangs);
                             }
