@@ -61,19 +61,26 @@ int option_seconds(long *us, const char *command, const char *option,
     return 0;
 }
 
+static const char *const ports[] = { "loop", "threads", "lcm", NULL };
+
+const char *options_port_name(enum port port)
+{
+    return ports[port - PORT_LOOP];
+}
+
 /* The index of value among names (ending in NULL), or -1 after a message. */
 static int choose(const char *command, const char *option, const char *value,
                   const char *const *names)
 {
-    char known[100];
+    char known[100] = "";
     int i, used = 0;
 
-    for (i = 0; names[i] != NULL; i++)
+    for (i = 0; names[i] != NULL; i++) {
         if (strcmp(value, names[i]) == 0)
             return i;
-    for (i = 0; names[i] != NULL; i++)
         used += snprintf(known + used, sizeof known - (size_t)used, "%s%s",
                          i > 0 ? ", " : "", names[i]);
+    }
     (void)misuse(command, "--%s %s: unknown; known are %s", option, value,
                  known);
     return -1;
@@ -110,7 +117,6 @@ int options_take(struct options *o, int c, char *const *argv)
     static const char *const filters[] = { "imm", "kf", NULL };
     static const char *const forms[] = { "joseph", "standard", NULL };
     static const char *const holds[] = { "none", "detect", "column", NULL };
-    static const char *const ports[] = { "loop", "lcm", NULL };
     static const char *const exchanges[] = { "gather", "reduce", NULL };
     long number = 0;
     int i, status = 0;

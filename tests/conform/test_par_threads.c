@@ -1,0 +1,72 @@
+/* The parallel IMM on port threads, where PEs really run at the same time: the
+ * serial filter's bits for any number of PEs, whoever is faster. */
+#include "par_case.h"
+
+#include "threads/port_threads.h"
+
+struct run {
+    jl_threads *threads;
+    struct par_shape shape;
+    int status[JL_MAX_PES + 1];
+    struct par_trace trace;
+};
+
+static void body(int node, void *context)
+{
+    struct run *run = context;
+    jl_chan *to[JL_MAX_PES + 1] = { NULL }, *from[JL_MAX_PES + 1] = { NULL };
+    int i, npe = run->shape.npe;
+
+    for (i = 0; i <= npe; i++)
+        if (i != node) {
+            to[i] = jl_threads_tx(run->threads, node, i);
+            from[i] = jl_threads_rx(run->threads, i, node);
+        }
+    if (node == npe)
+        run->status[node] = par_host(&run->trace, &run->shape, to[0], from[0],
+                                     NULL);
+    else
+        run->status[node] = par_pe(node, &run->shape, to, from, NULL);
+}
+
+static void compare(struct run *run, int slots)
+{
+    static struct par_trace serial;
+    int i;
+
+    par_serial(&serial, &run->shape);
+    run->threads = jl_threads_new(run->shape.npe + 1,
+                                  JL_PAR_MSG(PAR_M, PAR_N, PAR_Z), slots);
+    assert_non_null(run->threads);
+    assert_int_equal(jl_threads_run(run->threads, body, run), JL_OK);
+    for (i = 0; i <= run->shape.npe; i++)
+        assert_int_equal(run->status[i], JL_OK);
+    jl_threads_free(run->threads);
+    assert_same_bits(&run->trace, &serial, sizeof serial);
+}
+
+static void test_par_gives_serial_bits_on_threads_and_topologies(void **state)
+{
+    static struct run run = { .shape = { .M = PAR_M, .hangs_at = -1 } };
+    struct par_shape *s = &run.shape;
+    int slots;
+
+    (void)state;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 1; s->npe <= 8; s->npe++)
+            for (slots = 0; slots <= 2; slots++) {
+                s->sticky = (s->npe + slots) % 2;
+                s->form = slots == 1 ? &jl_kf_standard : &jl_kf_joseph;
+                compare(&run, slots);
+            }
+}
+
+int main(void)
+{
+    static const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_par_gives_serial_bits_on_threads_and_topologies),
+    };
+
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
