@@ -77,6 +77,7 @@ static void become_pe(int pe, const char *url, const char *run,
         }
     }
     argv[n] = NULL;
+    close_range(3, ~0u, 0);             /* LCM's sockets are not for it */
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() == parent)
         execv("/proc/self/exe", (char *const *)argv);
