@@ -64,16 +64,10 @@ static inline struct program *live_start_told(const char *const *told)
 #define live_start(...) \
     live_start_told((const char *const[]){ __VA_ARGS__, NULL })
 
-/* Wait for its end; what it said is good until live_free. */
+/* Wait for its end; what it said is good until program_free. */
 static inline void live_end(struct program *p)
 {
     program_end(p, PROGRAM_LIMIT);
-}
-
-static inline void live_free(struct program *p)
-{
-    program_free(p);
-    p->pid = 0;
 }
 
 static inline int live_kill_all(void **state)
@@ -81,15 +75,8 @@ static inline int live_kill_all(void **state)
     struct program *p;
 
     (void)state;
-    for (p = live_running; p < live_running + LIVE_RUNNING; p++) {
-        if (p->pid > 0 && p->out == NULL) {
-            kill(p->pid, SIGKILL);
-            waitpid(p->pid, NULL, 0);
-            close(p->out_fd);
-            close(p->err_fd);
-        }
-        live_free(p);
-    }
+    for (p = live_running; p < live_running + LIVE_RUNNING; p++)
+        program_kill(p);
     return 0;
 }
 

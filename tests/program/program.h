@@ -116,6 +116,15 @@ static inline void program_free(struct program *p)
     free(p->out);
     free(p->err);
     p->out = p->err = NULL;
+    p->pid = 0;
+}
+
+/* What a failed test left running: ended by its pid, and waited for. */
+static inline void program_kill(struct program *p)
+{
+    if (p->pid > 0 && p->out == NULL)
+        program_end(p, 0);
+    program_free(p);
 }
 
 /* The one run that is looked at; it is freed by the next. */

@@ -72,9 +72,9 @@ static void run_by_hand(void)
     check_good(pe0);
     check_good(pe1);
     check_same_text(host->out, estimates);
-    live_free(host);
-    live_free(pe0);
-    live_free(pe1);
+    program_free(host);
+    program_free(pe0);
+    program_free(pe1);
 #undef TOLD
 }
 
@@ -89,7 +89,7 @@ static void run_filter(void)
     live_end(p);
     check_good(p);
     check_same_text(p->out, estimates);
-    live_free(p);
+    program_free(p);
 }
 
 /* lcm-logger, too, loses messages on a busy machine (its queue holds 30). */
@@ -108,7 +108,7 @@ static void record(const char *path, void (*run)(void))
         log_await(path, DONE);
         kill(logger->pid, SIGTERM);
         live_end(logger);
-        live_free(logger);
+        program_free(logger);
         if (log_count(path, "JL." RUN ".measurement") == ROWS
             && log_count(path, "JL." RUN ".estimate") == ROWS)
             return;
@@ -237,7 +237,7 @@ static struct program *play(const char *path, const char *port,
                         "--lcm-url=" LIVE_URL, path);
     live_end(player);
     assert_int_equal(player->status, 0);
-    live_free(player);
+    program_free(player);
     live_end(live);
     check_good(live);
     *out = program_file(file);
@@ -258,12 +258,12 @@ static void check_plays(const char *path, const char *port,
         if (live_count_of(p, "lost") <= missing || i == TRIES)
             break;
         print_message("LCM lost something: once more\n");
-        live_free(p);
+        program_free(p);
         free(out);
     }
     check_counts(p, ROWS - missing, missing, 0, 0);
     check_same_estimates(out, expected);
-    live_free(p);
+    program_free(p);
     free(out);
 }
 
