@@ -32,7 +32,7 @@ INCLUDE := \#include
 have = $(shell echo '$(INCLUDE) <$(1)>' | $(CC) -E - >/dev/null 2>&1 && echo yes)
 HAVE_LCM := $(call have,lcm/lcm.h)
 HAVE_JANSSON := $(call have,jansson.h)
-HAVE_LCM_GEN := $(shell command -v lcm-gen)
+HAVE_LCM_GEN := $(shell command -v lcm-gen 2>/dev/null)
 PROGRAMS := $(if $(and $(HAVE_LCM),$(HAVE_JANSSON),$(HAVE_LCM_GEN),$(wildcard sim/main.c)),$(BUILD)/jumplink $(BUILD)/jumplink_f32)
 
 CORE_SRC := $(wildcard src/*/*.c)

@@ -315,8 +315,10 @@ static void test_live_killed_pe_while_waiting(void **state)
     needs_private_net();
     p = live_filter(two, "killed", folder, "lcm");
     send("killed", 1, 1, 0);
-    while (program_find("--pe 1", two, &pe) != 1)
+    while (program_find("--pe 1", two, &pe) != 1) {
+        assert_true(program_now() - p->began < PROGRAM_LIMIT);
         program_sleep(0.01);
+    }
     kill(pe, SIGKILL);
     live_end(p);
     if (p->status != 1 || strstr(p->err, "PE1 was ended by signal 9") == NULL)
