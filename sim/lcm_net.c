@@ -53,7 +53,7 @@ int lcm_node_open(struct lcm_node *node, int which, const char *url,
     config.nodes = node->nodes;
     config.number = JL_REAL_OCTETS;
     config.max_len = run_max_len(model);
-    config.slots = 2;
+    config.slots = run_slots(options);
     node->lcm = jl_lcm_open(&config, &why);
     if (node->lcm == NULL) {
         complain(url, 0, NULL, "LCM cannot be used: %s", why);

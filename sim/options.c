@@ -65,14 +65,17 @@ int option_seconds(long *us, const char *command, const char *option,
 static int choose(const char *command, const char *option, const char *value,
                   const char *const *names)
 {
-    int i;
+    char known[100];
+    int i, used = 0;
 
     for (i = 0; names[i] != NULL; i++)
         if (strcmp(value, names[i]) == 0)
             return i;
-    (void)misuse(command, "--%s %s: unknown; known are%s %s%s%s%s%s", option,
-                 value, "", names[0], i > 1 ? ", " : "", i > 1 ? names[1] : "",
-                 i > 2 ? ", " : "", i > 2 ? names[2] : "");
+    for (i = 0; names[i] != NULL; i++)
+        used += snprintf(known + used, sizeof known - (size_t)used, "%s%s",
+                         i > 0 ? ", " : "", names[i]);
+    (void)misuse(command, "--%s %s: unknown; known are %s", option, value,
+                 known);
     return -1;
 }
 
@@ -92,6 +95,15 @@ static int take_word(const char **to, const char *command, const char *option,
         : misuse(command, "--%s: must not be empty", option);
 }
 
+static const char *const topologies[] = {       /* JL_TOPO_... in order */
+    "full", "star", "ring", "chain", NULL
+};
+
+const char *options_topology(const struct options *o)
+{
+    return topologies[o->topology];
+}
+
 int options_take(struct options *o, int c, char *const *argv)
 {
     const char *value = optarg;
@@ -99,6 +111,7 @@ int options_take(struct options *o, int c, char *const *argv)
     static const char *const forms[] = { "joseph", "standard", NULL };
     static const char *const holds[] = { "none", "detect", "column", NULL };
     static const char *const ports[] = { "loop", "lcm", NULL };
+    static const char *const exchanges[] = { "gather", "reduce", NULL };
     long number = 0;
     int i, status = 0;
 
@@ -147,6 +160,12 @@ int options_take(struct options *o, int c, char *const *argv)
         return take_word(&o->time, o->command, "time", value);
     case 1012:
         return option_seconds(&o->start_us, o->command, "start", value);
+    case 1013:
+        o->topology = choose(o->command, "topology", value, topologies);
+        return o->topology < 0 ? 2 : 0;
+    case 1014:
+        o->exchange = choose(o->command, "exchange", value, exchanges);
+        return o->exchange < 0 ? 2 : 0;
     case 'o':
         return take_word(&o->out, o->command, "out", value);
     case ':':

@@ -44,6 +44,9 @@ jl_u32 run_fingerprint(const struct model *model,
 /* Octets of the longest message of the model, and of channels that hold it. */
 int run_max_len(const struct model *model);
 
+/* Messages that channels between PEs must hold, for none to wait. */
+int run_slots(const struct options *options);
+
 /* PE pe's part, until the host says stop; to and from have options->pes + 1
  * entries, of which the last is the host's.  Returns JL_OK, or a code of base.h
  * after a line that says why. */

@@ -14,7 +14,7 @@
 
 int run_is_channels(int status)
 {
-    return status <= JL_ETIMEOUT;
+    return status <= JL_ETIMEOUT && status != JL_ECHAIN;
 }
 
 int run_failed(const struct data_file *data, long row, int status)
@@ -80,10 +80,12 @@ static int host_row(struct estimates *e, long row,
     return status;
 }
 
-/* The answer to a measurement may come as late as a PE's own deadline. */
+/* The answer to a measurement may come as late as the last deadline of a PE:
+ * no hop's level is beyond 2 pes (plan.h). */
 static long answer_us(const struct options *options)
 {
-    return options->timeout_us + 1000000;
+    return options->timeout_us + options->timeout_us / 8 * 2 * options->pes
+        + 1000000;
 }
 
 /* The longest look at the network for a measurement, and then the links. */

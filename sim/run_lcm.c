@@ -41,7 +41,7 @@ static void become_pe(int pe, const char *url, const char *run,
                       const struct options *options, pid_t parent)
 {
     char which[16], pes[16], mode[16], timeout[32], wait[32];
-    const char *argv[24];
+    const char *argv[32];
     int n = 0;
 
     snprintf(which, sizeof which, "%d", pe);
@@ -65,6 +65,12 @@ static void become_pe(int pe, const char *url, const char *run,
     argv[n++] = timeout;
     argv[n++] = "--start";
     argv[n++] = wait;
+    argv[n++] = "--topology";
+    argv[n++] = options_topology(options);
+    if (options->exchange == JL_EXCHANGE_REDUCE) {
+        argv[n++] = "--exchange";
+        argv[n++] = "reduce";
+    }
     argv[n++] = "--form";
     argv[n++] = options->form == &jl_kf_joseph ? "joseph" : "standard";
     if (options->kf) {

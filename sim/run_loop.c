@@ -53,7 +53,8 @@ int run_loop(struct estimates *e, struct traffic *traffic,
     struct job job = { NULL, e, traffic, model, data, options, 1 };
     int status;
 
-    job.loop = jl_loop_new(options->pes + 1, run_max_len(model), 2);
+    job.loop = jl_loop_new(options->pes + 1, run_max_len(model),
+                           run_slots(options));
     if (job.loop == NULL) {
         complain("port loop", 0, NULL, "no memory for %d PEs", options->pes);
         return 1;

@@ -15,8 +15,7 @@
 static int is_private;
 
 struct run {
-    int npe, M, sticky;
-    const jl_kf_form *form;
+    struct par_shape shape;
     double drop;
 };
 
@@ -31,14 +30,14 @@ static jl_lcm *join(const struct run *run, int node, jl_chan **to,
     config.url = URL;
     config.run = "par";
     config.node = node;
-    config.nodes = run->npe + 1;
+    config.nodes = run->shape.npe + 1;
     config.number = JL_REAL_OCTETS;
     config.max_len = JL_PAR_MSG(PAR_M, PAR_N, PAR_Z);
     config.slots = 2;
     config.drop = run->drop;
     config.seed = 1;
     lcm = jl_lcm_open(&config, &why);
-    for (i = 0; lcm != NULL && i <= run->npe; i++) {
+    for (i = 0; lcm != NULL && i <= run->shape.npe; i++) {
         to[i] = jl_lcm_tx(lcm, i);
         from[i] = jl_lcm_rx(lcm, i);
     }
@@ -58,8 +57,7 @@ static void be_pe(const struct run *run, int pe, pid_t parent)
         _exit(1);
     lcm = join(run, pe, to, from);
     if (lcm != NULL)
-        status = par_pe(pe, run->npe, run->M, run->sticky, run->form, to,
-                        from);
+        status = par_pe(pe, &run->shape, to, from, NULL);
     jl_lcm_close(lcm, 10000000);
     _exit(status == JL_OK ? 0 : 1);
 }
@@ -72,17 +70,17 @@ static void compare(const struct run *run)
     int pe, host = JL_EIO, bad = 0, status;
     jl_lcm *lcm;
 
-    par_serial(&serial, run->M, run->sticky, run->form);
-    for (pe = 0; pe < run->npe; pe++) {
+    par_serial(&serial, &run->shape);
+    for (pe = 0; pe < run->shape.npe; pe++) {
         pid[pe] = fork();
         if (pid[pe] == 0)
             be_pe(run, pe, parent);
     }
-    lcm = join(run, run->npe, to, from);
+    lcm = join(run, run->shape.npe, to, from);
     if (lcm != NULL)
-        host = par_host(&trace, run->M, to[0], from[0]);
+        host = par_host(&trace, &run->shape, to[0], from[0]);
     jl_lcm_close(lcm, 10000000);
-    for (pe = 0; pe < run->npe; pe++) {
+    for (pe = 0; pe < run->shape.npe; pe++) {
         if (host != JL_OK)
             kill(pid[pe], SIGKILL);
         waitpid(pid[pe], &status, 0);
@@ -93,21 +91,25 @@ static void compare(const struct run *run)
     assert_same_bits(&trace, &serial, sizeof serial);
 }
 
-static void test_par_gives_serial_bits_over_lcm(void **state)
+static void test_par_gives_serial_bits_over_lcm_and_topologies(void **state)
 {
-    struct run run = { 0, PAR_M, 0, &jl_kf_joseph, 0 };
+    struct run run = { { 0, PAR_M, 0, &jl_kf_joseph, 0, 0, 0, -1 }, 0 };
+    struct par_shape *s = &run.shape;
 
     (void)state;
     if (!is_private)
         skip();
-    for (run.npe = 1; run.npe <= 8; run.npe++)
-        for (run.sticky = 0; run.sticky < 2; run.sticky++)
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 1; s->npe <= 8; s->npe++) {
+            s->sticky = s->npe % 2;
             compare(&run);
+        }
 }
 
 static void test_par_gives_serial_bits_over_a_lossy_lcm(void **state)
 {
-    struct run run = { 3, 5, 0, &jl_kf_joseph, 0.3 };
+    struct run run = { { 3, 5, 0, &jl_kf_joseph, 0, 0, 0, -1 }, 0.3 };
 
     (void)state;
     if (!is_private)
@@ -118,7 +120,7 @@ static void test_par_gives_serial_bits_over_a_lossy_lcm(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_par_gives_serial_bits_over_lcm),
+        cmocka_unit_test(test_par_gives_serial_bits_over_lcm_and_topologies),
         cmocka_unit_test(test_par_gives_serial_bits_over_a_lossy_lcm),
     };
 
