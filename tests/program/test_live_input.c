@@ -6,6 +6,8 @@
 #include <math.h>
 #include <sched.h>
 
+#include "jumplink/base.h"
+
 #define DATA TOP_DIR "/sim/data/"
 
 static char two[400], folder[400];
@@ -465,6 +467,42 @@ static void test_live_copies_of_many_states(void **state)
     jumplink_estimate_unsubscribe(live_lcm, sub);
 }
 
+static void on_any(const lcm_recv_buf_t *buf, const char *channel,
+                   const jumplink_estimate *got, void *context)
+{
+    struct answers *answers = context;
+
+    (void)buf;
+    (void)channel;
+    assert_int_equal(got->n, got->status == 0 ? 4 : 0);
+    assert_int_equal(got->n_P, got->status == 0 ? 10 : 0);
+    assert_int_equal(got->M, got->status == 0 ? 2 : 0);
+    answers->seq[answers->count++] = got->status;
+}
+
+/* The last copy says why there are no more. */
+static void test_live_copies_of_a_failed_step(void **state)
+{
+    static const int64_t statuses[] = { JL_OK, JL_OK, JL_ENONFINITE };
+    struct answers answers = { 0, { 0 } };
+    jumplink_estimate_subscription_t *sub;
+    const char *csv;
+    char text[80];
+
+    (void)state;
+    needs_private_net();
+    snprintf(text, sizeof text, "t_s,z0,z1\n0,0,0\n1,1,1\n2,%s,1\n3,1,1\n",
+             JL_REAL_FLOAT ? "1e30" : "1e300");     /* above JL_LARGE */
+    csv = scratch_write("failing.csv", text);
+    sub = jumplink_estimate_subscribe(live_lcm, "JL.failing.estimate", on_any,
+                                      &answers);
+    run_jumplink("filter", two, csv, "--pes", "2", "--timeout", "20",
+                 "--lcm-url", LIVE_URL, "--run", "failing");
+    check_refused(&ran, 1, "failing.csv:4: the step fails");
+    check_answers(&answers, statuses, 3);
+    jumplink_estimate_unsubscribe(live_lcm, sub);
+}
+
 /* ------------------------------------------------------------------------- */
 
 static int setup(void **state)
@@ -493,6 +531,7 @@ int main(void)
         live_test(test_live_without_a_network),
         live_test(test_live_wrong_use),
         live_test(test_live_copies_of_many_states),
+        live_test(test_live_copies_of_a_failed_step),
     };
 
     return cmocka_run_group_tests(tests, setup, live_teardown);
