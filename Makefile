@@ -25,37 +25,52 @@ WARN := -Wall -Wextra -Wshadow -Wconversion -Wundef -Wstrict-prototypes \
 EXACT := -ffp-contract=off -fno-math-errno
 CORE := -std=c89 -pedantic $(WARN) -Wdeclaration-after-statement $(EXACT) \
     -Iinclude -Isrc
-HOST := -std=c11 -D_GNU_SOURCE -pthread $(WARN) $(EXACT) -Iinclude -Iport -Isim
+HOST := -std=c11 -D_GNU_SOURCE -pthread $(WARN) $(EXACT) -Iinclude -Iport -Isim \
+    -I$(BUILD)/gen
 FLOAT := -DJL_REAL_FLOAT=1
 
 INCLUDE := \#include
 have = $(shell echo '$(INCLUDE) <$(1)>' | $(CC) -E - >/dev/null 2>&1 && echo yes)
 HAVE_LCM := $(call have,lcm/lcm.h)
 HAVE_JANSSON := $(call have,jansson.h)
-PROGRAMS := $(if $(and $(HAVE_LCM),$(HAVE_JANSSON),$(wildcard sim/main.c)),$(BUILD)/jumplink $(BUILD)/jumplink_f32)
+HAVE_LCM_GEN := $(shell command -v lcm-gen 2>/dev/null)
+PROGRAMS := $(if $(and $(HAVE_LCM),$(HAVE_JANSSON),$(HAVE_LCM_GEN),$(wildcard sim/main.c)),$(BUILD)/jumplink $(BUILD)/jumplink_f32)
 
 CORE_SRC := $(wildcard src/*/*.c)
 PORT_SRC := $(wildcard port/loop/*.c port/threads/*.c) $(if $(HAVE_LCM),$(wildcard port/lcm/*.c))
 SIM_SRC := $(wildcard sim/*.c)
+GEN_SRC := $(patsubst sim/lcm/%.lcm,$(BUILD)/gen/jumplink_%.c,$(wildcard sim/lcm/*.lcm))
 LIBS := -Wl,--as-needed -llcm -ljansson -lm
 
-.PHONY: all lib deps sim test golden run-tests check sanitize tsan run-tsan \
-    install clean force
+.PHONY: all lib deps sim test generated golden run-tests check sanitize tsan \
+    run-tsan install clean force
 .DELETE_ON_ERROR:
 .SECONDARY:
 
 all: lib $(BUILD)/libports.a $(PROGRAMS)
 	@$(if $(HAVE_LCM),:,echo "skipped: port lcm and the program (no lcm/lcm.h; make deps installs it)")
+	@$(if $(HAVE_LCM_GEN),:,echo "skipped: the program (no lcm-gen; make deps installs it)")
 	@$(if $(HAVE_JANSSON),:,echo "skipped: the program (no jansson.h; make deps installs it)")
 lib: $(BUILD)/libjumplink.a $(BUILD)/libjumplink_f32.a
+
+# --- typed messages ------------------------------------------------------
+
+# Code that lcm-gen makes of sim/lcm is not ours to warn about.
+GEN_OBJ := $(GEN_SRC:$(BUILD)/%.c=$(BUILD)/obj/%.o)
+generated: $(GEN_SRC)
+$(BUILD)/gen/jumplink_%.c $(BUILD)/gen/jumplink_%.h: sim/lcm/%.lcm
+	@mkdir -p $(@D); echo '  $@'; lcm-gen -c --c-cpath $(@D) --c-hpath $(@D) $<
+$(BUILD)/obj/gen/%.o: $(BUILD)/gen/%.c $(BUILD)/flags
+	$(call compile,-std=c99 -w)
+$(SIM_SRC:%.c=$(BUILD)/obj/%.o) $(SIM_SRC:%.c=$(BUILD)/obj_f32/%.o): | generated
 
 # --- libraries -----------------------------------------------------------
 
 $(BUILD)/libjumplink.a: $(CORE_SRC:%.c=$(BUILD)/obj/%.o)
 $(BUILD)/libjumplink_f32.a: $(CORE_SRC:%.c=$(BUILD)/obj_f32/%.o)
 $(BUILD)/libports.a: $(PORT_SRC:%.c=$(BUILD)/obj/%.o)
-$(BUILD)/libsim.a: $(filter-out %/main.o,$(SIM_SRC:%.c=$(BUILD)/obj/%.o))
-$(BUILD)/libsim_f32.a: $(filter-out %/main.o,$(SIM_SRC:%.c=$(BUILD)/obj_f32/%.o))
+$(BUILD)/libsim.a: $(filter-out %/main.o,$(SIM_SRC:%.c=$(BUILD)/obj/%.o)) $(GEN_OBJ)
+$(BUILD)/libsim_f32.a: $(filter-out %/main.o,$(SIM_SRC:%.c=$(BUILD)/obj_f32/%.o)) $(GEN_OBJ)
 $(BUILD)/%.a: $(BUILD)/sources
 	@rm -f $@; echo '  $@'; $(AR) rcs $@ $(filter %.o,$^)
 
@@ -72,7 +87,7 @@ $(BUILD)/obj_f32/%.o: %.c $(BUILD)/flags
 # Two notes that change only when what they say changes, so that other flags
 # or a source that is gone also rebuild what they concern.
 $(BUILD)/flags: NOTE = $(CC) $(CORE) $(HOST) $(CFLAGS)
-$(BUILD)/sources: NOTE = $(CORE_SRC) $(PORT_SRC) $(SIM_SRC)
+$(BUILD)/sources: NOTE = $(CORE_SRC) $(PORT_SRC) $(SIM_SRC) $(GEN_SRC)
 $(BUILD)/flags $(BUILD)/sources: force
 	@mkdir -p $(@D)
 	@echo '$(NOTE)' | cmp -s - $@ || echo '$(NOTE)' >$@
@@ -109,8 +124,8 @@ tsan: deps
 
 check: deps
 	@CC='$(CC)' sh tests/check/deps.sh check
-	$(AGAIN) golden
-	@MAKE='$(MAKE)' BUILD='$(BUILD)/check' GOLDEN='$(BUILD)/golden' sh tests/check/check_all.sh
+	$(AGAIN) golden generated
+	@MAKE='$(MAKE)' BUILD='$(BUILD)/check' GOLDEN='$(BUILD)/golden' GEN='$(BUILD)/gen' sh tests/check/check_all.sh
 
 # --- tests ---------------------------------------------------------------
 
@@ -133,9 +148,9 @@ $$(TESTS_$(1)$(2)): $(BUILD)/tests$(2)/%: $(BUILD)/obj$(2)/tests/$(1)/%.o \
 endef
 $(foreach f,$(TEST_FOLDERS),$(eval $(call tests_of,$f,))$(eval $(call tests_of,$f,_f32)))
 
-$(BUILD)/obj/tests/%.o: tests/%.c $(BUILD)/flags | golden
+$(BUILD)/obj/tests/%.o: tests/%.c $(BUILD)/flags | golden generated
 	$(call compile,$(call TESTING,))
-$(BUILD)/obj_f32/tests/%.o: tests/%.c $(BUILD)/flags | golden
+$(BUILD)/obj_f32/tests/%.o: tests/%.c $(BUILD)/flags | golden generated
 	$(call compile,$(call TESTING,_f32) $(FLOAT))
 
 # The reference cases as C tables, so that the same test bodies run on a board.

@@ -7,9 +7,11 @@
 # group   package   what must be there: a header, or a program
 needs='
 sim       liblcm-dev                 lcm/lcm.h
+sim       liblcm-bin                 lcm-gen
 sim       libjansson-dev             jansson.h
 sim       gnuplot-nox                gnuplot
 test      libcmocka-dev              cmocka.h
+test      iproute2                   ip
 check     binutils                   objdump
 check     g++                        g++
 check     clang                      clang++
