@@ -11,6 +11,7 @@ sim       libjansson-dev             jansson.h
 sim       gnuplot-nox                gnuplot
 test      libcmocka-dev              cmocka.h
 check     binutils                   objdump
+check     spin                       spin
 check     g++                        g++
 check     clang                      clang++
 check     gcc-arm-none-eabi          arm-none-eabi-gcc
