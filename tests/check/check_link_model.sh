@@ -23,7 +23,7 @@ search() {
     rm -rf "$build" && mkdir -p "$build" && cp "$models/$model" "$build" || exit 1
     result=$build/result
     (cd "$build" && spin "$@" -a "$model" &&
-        ${CC:-cc} -O2 -w -DMEMLIM=1900 $compile -o pan pan.c &&
+        ${CC:-cc} -O1 -w -DMEMLIM=1900 $compile -o pan pan.c &&
         ./pan -m100000 $options) >"$result" 2>&1
     if ! grep -q 'errors: ' "$result" || grep -q 'depth too small' "$result"; then
         tail -n 5 "$result"

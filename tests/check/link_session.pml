@@ -5,19 +5,23 @@
  *
  * What is left out, and why what holds here holds there:
  *  - Time.  HELLO is repeated, and an end that is up talks, at any moment.
+ *    Silence is found at any moment, right or wrong, while the carrier is bad;
+ *    when it is calm, of an end that does not talk.
  *  - DATA, LAST, ACK and BYE are one kind, TALK: take_ack and take_piece see
  *    them only after all that decides here.
  *  - Sessions are 1, 2, 3 for the starts of a program.  The code compares them
- *    only for equality; that none returns is what WIRE.md demands.
- *  - The carrier remembers all frames ever said, as a set, and may bring any of
- *    them at any time, often, never: it loses, doubles, delays and replays
- *    without bound.  At some time it may become calm: nobody starts again, no
- *    old frame comes, and each new one arrives.  What must happen from every
- *    state once it is calm happens with certainty where it is calm for long
- *    enough with any chance at all.
+ *    only for equality; that none returns is what link.h demands.
+ *  - Of a frame's peer counts only whether it is the hearer's session, as in
+ *    jl_link_input.  Frames that know the hearer are remembered until it starts
+ *    again, when they become frames that do not; and those the carrier may
+ *    bring even if they were never said.
+ *  - The carrier may bring any frame ever said at any time, often, never: it
+ *    loses, doubles, delays and replays without bound.  Some time it becomes
+ *    calm: nobody starts again, no old frame comes, each new one arrives.  What
+ *    must happen from every state once it is calm happens with certainty where
+ *    there is any chance that it stays calm for a while.
  */
-#define LIVES 3                         /* most starts of one end */
-
+/* -DL0, -DL1: the most starts of each end. */
 /* -DMUTANT=name: a protocol that is wrong in one way. */
 #ifndef MUTANT
 #define MUTANT 0
@@ -102,9 +106,9 @@ inline input(l, other)
         :: session != l.peer && MUTANT != ANY_SESSION ->
             meet_stranger(l, other)
         :: session == l.peer && kind == HELLO ->
-            l.ack_now = (MUTANT != HELLO_UNANSWERED)
-        :: session == l.peer && kind == TALK && !knows_us ->
-            l.ack_now = (MUTANT != MISTAKE_UNTOLD)
+            l.ack_now = l.ack_now || MUTANT != HELLO_UNANSWERED
+        :: session == l.peer && kind != HELLO && !knows_us ->
+            l.ack_now = l.ack_now || MUTANT != MISTAKE_UNTOLD
         :: else ->
             assert(kind != TALK || session == l.peer)   /* take_piece */
         fi
