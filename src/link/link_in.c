@@ -129,6 +129,8 @@ int jl_link_input(jl_link *link, const unsigned char *datagram, int len,
         link->ack_now = 1;      /* it is not up yet: any frame brings it up */
         return JL_OK;
     }
+    if (!knows_us)
+        link->ack_now = 1;      /* it is up with an earlier session of ours */
     if (!knows_us || frame.kind == JL_FRAME_ALIVE)
         return refuse(&link->count.stale, JL_EPEER);
     take_ack(link, &frame, now);

@@ -443,6 +443,34 @@ static void test_link_peer_restarts(void **state)
     }
 }
 
+/* An end that answers a HELLO of the new life, and then is brought up by a
+ * late one of the old: the new life is up and silent, and must make it ask. */
+static void test_link_late_hello_of_an_old_life(void **state)
+{
+    unsigned char out[JL_FRAME_MAX], late[JL_FRAME_MAX];
+    jl_link *l0 = &w.e[0].link, *l1 = &w.e[1].link;
+    int len;
+
+    (void)state;
+    begin(clean, 1);
+    len = jl_link_output(l0, out, JL_FRAME_MAX, w.now);
+    assert_int_equal(jl_link_input(l1, out, len, w.now), JL_OK);
+    assert_int_equal(jl_link_output(l1, late, JL_FRAME_MAX, w.now), 36);
+    start(1, 0x3333);
+    len = jl_link_output(l1, out, JL_FRAME_MAX, w.now);
+    assert_int_equal(jl_link_input(l0, out, len, w.now), JL_OK);
+    len = jl_link_output(l0, out, JL_FRAME_MAX, w.now);
+    assert_int_equal(jl_link_input(l1, out, len, w.now), JL_OK);
+    assert_int_equal(l1->up, 1);
+    assert_true(jl_link_output(l1, out, JL_FRAME_MAX, w.now) > 0);  /* lost */
+    assert_int_equal(jl_link_input(l0, late, 36, w.now), JL_OK);
+    assert_int_equal(l0->up, 1);
+    goals(1, 0);
+    run(NULL, SECONDS(1));
+    assert_int_equal(w.e[0].told, JL_EPEER);
+    assert_int_equal(w.e[1].got, 0);
+}
+
 /* What had wholly arrived before the restart is still fetched. */
 static void test_link_restart_drains(void **state)
 {
@@ -1107,6 +1135,7 @@ int main(void)
         cmocka_unit_test(test_link_room_is_told),
         cmocka_unit_test(test_link_starts_in_any_order),
         cmocka_unit_test(test_link_peer_restarts),
+        cmocka_unit_test(test_link_late_hello_of_an_old_life),
         cmocka_unit_test(test_link_restart_drains),
         cmocka_unit_test(test_link_restarts_settle),
         cmocka_unit_test(test_link_replay_of_a_session),
