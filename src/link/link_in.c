@@ -84,7 +84,7 @@ static int meet_stranger(jl_link *link, const jl_frame *frame, int knows_us)
     link->count.stale++;
     if (frame->kind == JL_FRAME_ALIVE && knows_us) {
         link->up = 0;
-        if (link->failed == JL_OK)
+        if (link->failed == JL_OK || jli_unsaid(link))
             link->failed = JL_EPEER;
     } else if (frame->kind == JL_FRAME_HELLO || knows_us) {
         link->doubt = frame->session;

@@ -25,6 +25,14 @@ JL_INLINE int jli_over(const jl_link *link)
     return link->failed != JL_OK && !link->up;
 }
 
+/* Does the other end perhaps lack a piece of a message? */
+JL_INLINE int jli_unsaid(const jl_link *link)
+{
+    jl_u32 bye = link->closing ? 1 : 0;
+
+    return jli_ahead(link->out_end, link->out_first) > bye;
+}
+
 /* A piece in a ring, `ahead` behind the oldest.  The ring's index is kept
  * apart from the piece's number, since the window need not divide 2^32. */
 JL_INLINE unsigned char *jli_piece(unsigned char *ring, int slot, int ahead,

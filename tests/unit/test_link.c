@@ -938,6 +938,18 @@ static void test_link_restart_after_close(void **state)
     assert_int_equal(jl_link_recv(&w.e[1].link, msg, MAX_LEN), JL_ECLOSED);
     assert_int_equal(jl_link_idle(&w.e[1].link), 1);
     assert_int_equal(jl_link_timer(&w.e[1].link, w.now), -1);
+
+    up();                       /* but not if something never arrived */
+    assert_int_equal(jl_link_send(&w.e[1].link, msg, 1), JL_OK);
+    w.c.lose = 100;
+    act(1);
+    w.c.lose = 0;
+    w.e[0].close = 1;
+    act(0);
+    start(0, 0x3333);
+    run(NULL, SECONDS(1));
+    assert_int_equal(w.e[0].got, 0);
+    assert_int_equal(jl_link_recv(&w.e[1].link, msg, MAX_LEN), JL_EPEER);
 }
 
 static void test_link_acknowledges_in_time(void **state)
