@@ -25,14 +25,6 @@ JL_INLINE int jli_over(const jl_link *link)
     return link->failed != JL_OK && !link->up;
 }
 
-/* Does the other end perhaps lack a piece of a message? */
-JL_INLINE int jli_unsaid(const jl_link *link)
-{
-    jl_u32 bye = link->closing ? 1 : 0;
-
-    return jli_ahead(link->out_end, link->out_first) > bye;
-}
-
 /* A piece in a ring, `ahead` behind the oldest.  The ring's index is kept
  * apart from the piece's number, since the window need not divide 2^32. */
 JL_INLINE unsigned char *jli_piece(unsigned char *ring, int slot, int ahead,
@@ -53,5 +45,13 @@ JL_INLINE void jli_piece_put(unsigned char *piece, int kind,
 #define JLI_PIECE_LEN(piece) ((int)jl_get_u16(piece))
 #define JLI_PIECE_KIND(piece) ((int)(piece)[2])
 #define JLI_PIECE_PAYLOAD(piece) ((piece) + 4)
+
+/* Does the other end perhaps lack a piece of a message? */
+JL_INLINE int jli_unsaid(const jl_link *link)
+{
+    jl_u32 bye = link->closing ? 1 : 0;
+
+    return jli_ahead(link->out_end, link->out_first) > bye;
+}
 
 #endif

@@ -55,15 +55,16 @@ caught() {
     complain "$model $*: not caught by: $error"
 }
 
-# Any frame at any time; and one in order, with numbers that wrap.
+# Any frame at any time; and in order, with numbers that wrap.
 ageless='link_transfer.pml -DAGELESS -DC0=1 -DC1=1 -DSEQ=16 -DN1=1'
 wrapping='link_transfer.pml -DC0=2 -DC1=1 -DSEQ=8 -DN1=0'
-fair='link_transfer.pml -DFAIR -DC0=1 -DC1=1 -DN0=3 -DN1=0'
+fair='link_transfer.pml -DFAIR -DC0=1 -DC1=1'
 session='link_session.pml -DL0=2'
 
 holds safe $ageless -DN0=4 -DW=3
 holds safe $wrapping -DN0=9
-holds live $fair -DSEQ=8
+holds live $fair -DAGELESS -DSEQ=16 -DN0=3 -DN1=0
+holds live $fair -DAGELESS -DSEQ=16 -DN0=1 -DN1=1
 holds safe $session -DL1=3
 holds safe $session -DL1=3 -DBEATS
 holds live $session -DL1=2
@@ -78,9 +79,9 @@ caught 'out_first<=E[(1-i)].taken' safe $ageless -DN0=3 -DMUTANT=ANY_ACK
 caught 'in_held<=2' safe $ageless -DN0=3 -DMUTANT=ROOM_UNSEEN
 caught 'E[(1-i)].taken>=' safe $ageless -DN0=3 -DMUTANT=BYE_ENDS_ALL
 caught 'invalid end state' safe $wrapping -DN0=3 -DMUTANT=NEVER_AGAIN
-caught 'acceptance cycle' live $fair -DSEQ=8 -DMUTANT=NEVER_AGAIN
-caught 'acceptance cycle' live $fair -DSEQ=8 -DMUTANT=TWICE_UNSAID
-caught 'acceptance cycle' live $fair -DSEQ=4
+caught 'acceptance cycle' live $fair -DAGELESS -DSEQ=16 -DN0=3 -DN1=0 -DMUTANT=NEVER_AGAIN
+caught 'acceptance cycle' live $fair -DAGELESS -DSEQ=16 -DN0=3 -DN1=0 -DMUTANT=TWICE_UNSAID
+caught 'acceptance cycle' live $fair -DSEQ=4 -DN0=3 -DN1=0
 
 session="$session -DL1=2"
 caught 'session>=E[i].born' safe $session -DMUTANT=UP_BY_HELLO

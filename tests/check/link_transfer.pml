@@ -18,11 +18,11 @@
  *    may see the numbers wrap.  (2^31 pieces are hours on any carrier.)
  *  - Two carriers.  One keeps the order, loses and doubles, and has room for
  *    C0 and C1 frames each way.  The other, AGELESS, brings any frame that can
- *    have been said so far, at any time, any number of times: it says more
- *    than any real one, so what never happens with it never happens; but
- *    what must happen is asked of the first.
- *  - Fairness.  The carrier becomes calm some time, after as much mischief as
- *    there may be, and then loses nothing.  What must happen from every state
+ *    have been said so far, at any time, any number of times, or never: it can
+ *    do more than any real one, and reaches more states.
+ *  - Fairness.  Either carrier becomes calm some time, after as much mischief as
+ *    there may be; then it keeps the order and loses nothing.  What must happen
+ *    from every state
  *    once nothing is lost happens with certainty where each frame has a chance
  *    to arrive, since such a run is finite.
  */
@@ -41,6 +41,12 @@
 #define BYE_ENDS_ALL 6
 #define NEVER_AGAIN 7
 #define TWICE_UNSAID 8
+
+#ifdef AGELESS
+#define IN_ORDER false                  /* not before it is calm */
+#else
+#define IN_ORDER true
+#endif
 
 #define N(i) (i -> N1 : N0)             /* messages that end i sends */
 #define AHEAD(a, b) (((a) + 256 * SEQ - (b)) % SEQ)     /* jli_ahead */
@@ -131,6 +137,22 @@ inline take_piece(l)
     fi
 }
 
+inline input(i)
+{
+    if
+    :: kind != ACK -> select(asks : 0 .. 1)
+    :: else
+    fi;
+    d_step {
+        take_ack(E[i], E[1 - i]);
+        if
+        :: kind != ACK -> take_piece(E[i])
+        :: else
+        fi;
+        kind = 0; seq = 0; ack = 0; meaning = 0; n = 0; asks = 0
+    }
+}
+
 /* jl_link_input */
 proctype Input(bit i)
 {
@@ -142,6 +164,7 @@ end:
     do
     :: atomic {
 #ifdef AGELESS
+        !calm ->
         if
         :: kind = ACK;
             select(seq : 0 .. 1);
@@ -151,25 +174,15 @@ end:
             seq = meaning;
             kind = (meaning == N(1 - i) -> BYE : PIECE)
         fi;
-#else
+        input(i) }
+    :: atomic {
+#endif
         nempty(wire[1 - i]) ->
         if
         :: wire[1 - i]?kind, seq, ack, meaning
         :: !calm -> wire[1 - i]?<kind, seq, ack, meaning>       /* doubled */
         fi;
-#endif
-        if
-        :: kind != ACK -> select(asks : 0 .. 1)
-        :: else
-        fi;
-        d_step {
-            take_ack(E[i], E[1 - i]);
-            if
-            :: kind != ACK -> take_piece(E[i])
-            :: else
-            fi;
-            kind = 0; seq = 0; ack = 0; meaning = 0; n = 0; asks = 0
-        } }
+        input(i) }
     od
 }
 
@@ -204,9 +217,8 @@ end:
             E[i].ack_due = false
         }
         if
-#ifndef AGELESS
-        :: nfull(wire[i]) -> wire[i]!kind, seq, E[i].in_next % SEQ, meaning
-#endif
+        :: nfull(wire[i]) && (calm || IN_ORDER) ->
+            wire[i]!kind, seq, E[i].in_next % SEQ, meaning
         :: !calm                        /* lost */
         fi;
         kind = 0; seq = 0; meaning = 0 }

@@ -689,6 +689,32 @@ static void test_link_hello_repeats(void **state)
     assert_int_equal(jl_link_timer(l, w.now), 20000);
 }
 
+/* Room is told sooner than at half a ring when all that is left is a message whose rest had no room. */
+static void test_link_room_for_the_rest(void **state)
+{
+    unsigned char out[JL_FRAME_MAX];
+    jl_link *l = &w.e[1].link;
+    jl_link_config c = config(11, 10, 0x2222);
+    jl_u32 i;
+
+    (void)state;
+    begin(clean, 1);
+    c.slots = 1;
+    assert_int_equal(jl_link_init(l, &c, w.e[1].mem, MEM, w.now), JL_OK);
+    assert_int_equal(l->window, 3);
+    assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, 0, 0, 4), JL_OK);
+    for (i = 1; i < 3; i++)
+        assert_int_equal(forge(JL_FRAME_DATA, 0x1111, 0x2222, i, 0,
+                               JL_FRAME_PAYLOAD), JL_OK);
+    assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, 3, 0, 4), JL_EAGAIN);
+    while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
+        assert_int_equal(jl_get_u32(out + 16), 0);
+    assert_int_equal(jl_link_recv(l, msg, MAX_LEN), 4);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 36);
+    assert_int_equal(jl_get_u32(out + 16), 1);
+    assert_int_equal(jl_get_u32(out + 20), 3);
+}
+
 /* Room is told once, when half of the ring is free. */
 static void test_link_room_at_half(void **state)
 {
@@ -744,32 +770,6 @@ static void test_link_room_at_half(void **state)
     w.now += 15000;
     assert_int_equal(forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, 2, 0), JL_OK);
     assert_int_equal(jl_link_timer(l, w.now), 20000);
-}
-
-/* And sooner, when all that is left is a message whose rest had no room. */
-static void test_link_room_for_the_rest(void **state)
-{
-    unsigned char out[JL_FRAME_MAX];
-    jl_link *l = &w.e[1].link;
-    jl_link_config c = config(11, 10, 0x2222);
-    jl_u32 i;
-
-    (void)state;
-    begin(clean, 1);
-    c.slots = 1;
-    assert_int_equal(jl_link_init(l, &c, w.e[1].mem, MEM, w.now), JL_OK);
-    assert_int_equal(l->window, 3);
-    assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, 0, 0, 4), JL_OK);
-    for (i = 1; i < 3; i++)
-        assert_int_equal(forge(JL_FRAME_DATA, 0x1111, 0x2222, i, 0,
-                               JL_FRAME_PAYLOAD), JL_OK);
-    assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, 3, 0, 4), JL_EAGAIN);
-    while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
-        assert_int_equal(jl_get_u32(out + 16), 0);
-    assert_int_equal(jl_link_recv(l, msg, MAX_LEN), 4);
-    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 36);
-    assert_int_equal(jl_get_u32(out + 16), 1);
-    assert_int_equal(jl_get_u32(out + 20), 3);
 }
 
 static void test_link_before_it_is_up(void **state)
