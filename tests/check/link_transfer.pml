@@ -22,9 +22,8 @@
  *    do more than any real one, and reaches more states.
  *  - Fairness.  Either carrier becomes calm some time, after as much mischief as
  *    there may be; then it keeps the order and loses nothing.  What must happen
- *    from every state
- *    once nothing is lost happens with certainty where each frame has a chance
- *    to arrive, since such a run is finite.
+ *    from every state so reached happens with certainty where each frame has a
+ *    chance to arrive, since a finite run without loss suffices.
  */
 #ifndef W
 #define W 2                             /* link->window */
