@@ -48,8 +48,10 @@ caught() {
     error=$1
     shift
     search "$@"
-    mutants=$((mutants + 1))
-    grep '^pan:1:' "$result" | grep -qF "$error" && return
+    if grep '^pan:1:' "$result" | grep -qF "$error"; then
+        mutants=$((mutants + 1))
+        return
+    fi
     grep '^pan:1:' "$result" || echo 'no error'
     shift 2
     complain "$model $*: not caught by: $error"
