@@ -100,7 +100,7 @@ static int meet_stranger(jl_link *link, const jl_frame *frame, int knows_us)
     link->count.stale++;
     if (frame->kind == JL_FRAME_ALIVE && knows_us) {
         link->up = 0;
-        if (link->failed == JL_OK)
+        if (link->failed == JL_OK || jli_unsaid(link))
             link->failed = JL_EPEER;
     } else if (frame->kind == JL_FRAME_HELLO || knows_us) {
         link->doubt = frame->session;
@@ -146,6 +146,8 @@ int jl_link_input(jl_link *link, const unsigned char *datagram, int len,
         link->ack_now = 1;      /* it is not up yet: any frame brings it up */
         return JL_OK;
     }
+    if (!knows_us)
+        link->ack_now = 1;      /* it is up with an earlier session of ours */
     if (!knows_us || frame.kind == JL_FRAME_ALIVE)
         return refuse(&link->count.stale, JL_EPEER);
     jli_heard(link, now);

@@ -72,4 +72,12 @@ JL_INLINE void jli_piece_put(unsigned char *piece, int kind,
 #define JLI_PIECE_KIND(piece) ((int)(piece)[2])
 #define JLI_PIECE_PAYLOAD(piece) ((piece) + 4)
 
+/* Does the other end perhaps lack a piece of a message? */
+JL_INLINE int jli_unsaid(const jl_link *link)
+{
+    jl_u32 bye = link->closing ? 1 : 0;
+
+    return jli_ahead(link->out_end, link->out_first) > bye;
+}
+
 #endif

@@ -13,6 +13,7 @@ sim       gnuplot-nox                gnuplot
 test      libcmocka-dev              cmocka.h
 test      iproute2                   ip
 check     binutils                   objdump
+check     spin                       spin
 check     g++                        g++
 check     clang                      clang++
 check     gcc-arm-none-eabi          arm-none-eabi-gcc
