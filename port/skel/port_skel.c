@@ -3,8 +3,7 @@
 #include <limits.h>
 #include <string.h>
 
-/* Datagrams taken in before the links may answer. */
-#define HANDLE_MAX 64
+#define HANDLE_MAX 64           /* datagrams taken in before links answer   */
 
 static jl_u32 now(const jl_skel *s)
 {
@@ -69,12 +68,13 @@ static void take(jl_skel *s, const unsigned char *datagram, int len)
         jl_link_input(&s->peers[from].link, datagram, len, now(s));
 }
 
-/* Wait up to wait_us for a datagram, and take in what is there. */
+/* Wait up to wait_us for a datagram, take in what is there, and only then
+ * judge who is silent. */
 static void take_in(jl_skel *s, long wait_us)
 {
     const jl_skel_carrier *carrier = &s->config.carrier;
     unsigned char datagram[JL_FRAME_MAX];
-    int n, len;
+    int i, n, len;
 
     for (n = 0; n < HANDLE_MAX && s->failed == JL_OK; n++) {
         len = carrier->get(carrier->context, datagram, sizeof datagram,
@@ -84,6 +84,9 @@ static void take_in(jl_skel *s, long wait_us)
         else if (note(s, len) == JL_OK)
             break;
     }
+    for (i = 0; i < s->config.nodes && n < HANDLE_MAX; i++)
+        if (i != s->config.node)
+            jl_link_judge(&s->peers[i].link, now(s));
 }
 
 /* --- a call that blocks ------------------------------------------------- */
@@ -204,6 +207,8 @@ static int peer_init(jl_skel *s, int node, unsigned char *mem, int cap)
     link.slots = 2 * c->slots;
     link.rto_us = c->rto_us;
     link.ack_us = c->ack_us;
+    link.beat_us = c->beat_us;
+    link.silence_us = c->silence_us;
     jl_chan_init(&p->tx.chan, &skel_ops, c->max_len, c->slots);
     jl_chan_init(&p->rx.chan, &skel_ops, c->max_len, c->slots);
     p->tx.skel = p->rx.skel = s;

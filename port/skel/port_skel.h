@@ -8,7 +8,8 @@
  * while it is in a call, or in jl_skel_poll.
  *
  * A node that computes for longer than rto_us between calls is sent some
- * datagrams again, which costs time only.
+ * datagrams again, which costs time only; for longer than the others'
+ * silence_us, and it is taken for dead (JL_ESILENT).
  */
 #ifndef PORT_SKEL_H
 #define PORT_SKEL_H
@@ -46,6 +47,9 @@ typedef struct jl_skel_config {
     int slots;                  /* longest messages held, >= 1; 2 is usual  */
     jl_u32 rto_us;              /* a few times the carrier's round trip     */
     jl_u32 ack_us;              /* a quarter of it                          */
+    jl_u32 beat_us;             /* longest a node says nothing; 0: any      */
+    jl_u32 silence_us;          /* longest a peer may say nothing, many of
+                                   its beat_us; 0: any                      */
 } jl_skel_config;
 
 /* Octets of memory for a node: a link holds twice the slots, since what was
@@ -90,8 +94,9 @@ int jl_skel_poll(jl_skel *skel);
 
 /* Close: wait up to linger_us until all that was sent is acknowledged, or its
  * receiver has closed; then stay three rto_us to answer peers that did not hear
- * our last word.  Returns JL_OK, JL_ETIMEOUT (some may not have had all), JL_EIO.
- */
+ * our last word.
+ * Returns JL_OK, JL_ETIMEOUT (a peer has not had all, or has left and its last
+ * word was lost), JL_EIO. */
 int jl_skel_close(jl_skel *skel, long linger_us);
 
 #endif

@@ -26,6 +26,7 @@ static struct radio radios[NODES];
 static jl_skel skels[NODES];
 static unsigned char mem[NODES][MEM];
 static unsigned lost;           /* of 100 datagrams                         */
+static jl_u32 beat_us;
 static jl_u32 lives;
 
 /* --- the three functions ------------------------------------------------- */
@@ -94,6 +95,8 @@ static void join(int node, int nodes)
     config.slots = SLOTS;
     config.rto_us = 20000;
     config.ack_us = 5000;
+    config.beat_us = beat_us;
+    config.silence_us = 8 * beat_us;
     EXPECT(jl_skel_init(&skels[node], &config, mem[node], MEM), ==, JL_OK);
 }
 
@@ -111,6 +114,15 @@ struct crew {
     conform_body body;
 };
 
+/* The last acknowledgement may be lost, and its sender gone. */
+static void leave(int node)
+{
+    int status = jl_skel_close(&skels[node], LINGER_US);
+
+    if (lost == 0 || status != JL_ETIMEOUT)
+        EXPECT(status, ==, JL_OK);
+}
+
 static void live(int node, void *context)
 {
     const struct crew *crew = context;
@@ -121,7 +133,7 @@ static void live(int node, void *context)
     }
     join(node, crew->nodes);
     crew->body(node);
-    EXPECT(jl_skel_close(&skels[node], LINGER_US), ==, JL_OK);
+    leave(node);
 }
 
 static int run(int nodes, conform_body body)
@@ -179,6 +191,9 @@ static void test_conform_skel_lossy(void **state)
 /* --- the parallel filter ------------------------------------------------- */
 
 static struct par_trace trace;
+static const struct par_shape shape = {
+    NODES - 1, PAR_M, 0, &jl_kf_joseph, JL_TOPO_RING, JL_EXCHANGE_GATHER, -1, -1
+};
 
 static void filter(int node)
 {
@@ -191,10 +206,9 @@ static void filter(int node)
             from[i] = rx(i, node);
         }
     if (node == NODES - 1)
-        EXPECT(par_host(&trace, PAR_M, to[0], from[0]), ==, JL_OK);
+        EXPECT(par_host(&trace, &shape, to[0], from[0], NULL), ==, JL_OK);
     else
-        EXPECT(par_pe(node, NODES - 1, PAR_M, 0, &jl_kf_joseph, to, from), ==,
-               JL_OK);
+        EXPECT(par_pe(node, &shape, to, from, NULL), ==, JL_OK);
 }
 
 static void test_skel_gives_serial_bits(void **state)
@@ -202,7 +216,7 @@ static void test_skel_gives_serial_bits(void **state)
     static struct par_trace serial;
 
     (void)state;
-    par_serial(&serial, PAR_M, 0, &jl_kf_joseph);
+    par_serial(&serial, &shape);
     for (lost = 0; lost <= 30; lost += 30) {
         assert_int_equal(run(NODES, filter), 0);
         assert_same_bits(&trace, &serial, sizeof serial);
@@ -210,6 +224,27 @@ static void test_skel_gives_serial_bits(void **state)
 }
 
 /* --- what is the port's own ---------------------------------------------- */
+
+/* A node that goes without a word, and comes to no call any more. */
+static void falls_silent(int node)
+{
+    EXPECT(jl_chan_send(tx(node, 1 - node), NULL, 0, LONG_US), ==, JL_OK);
+    EXPECT(jl_chan_recv(rx(1 - node, node), NULL, 0, LONG_US), ==, 0);
+    if (node == 0)
+        EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, JL_FOREVER), ==, JL_ESILENT);
+    else
+        EXPECT(jl_chan_recv(jl_loop_rx(loop, 2, 1), NULL, 0, 900000), ==,
+               JL_ETIMEOUT);
+}
+
+static void test_skel_notices_silence(void **state)
+{
+    (void)state;
+    lost = 0;
+    beat_us = 100000;
+    assert_int_equal(run(2, falls_silent), 0);
+    beat_us = 0;
+}
 
 /* Datagrams of nobody are counted. */
 static void among_strangers(int node)
@@ -317,6 +352,7 @@ int main(void)
         cmocka_unit_test(test_conform_skel),
         cmocka_unit_test(test_conform_skel_lossy),
         cmocka_unit_test(test_skel_gives_serial_bits),
+        cmocka_unit_test(test_skel_notices_silence),
         cmocka_unit_test(test_skel_counts_strays),
         cmocka_unit_test(test_skel_machine_fails),
         cmocka_unit_test(test_skel_refuses),

@@ -5,7 +5,8 @@
  * a right checksum and are blind: they do not know the receiver's session.
  * Whatever it does, what an end receives are the first messages of one life of
  * the other end, in order and whole; a link fails only if the other end has
- * closed or restarted; and when the adversary tires, all that was sent arrives.
+ * closed, restarted, or not been heard for silence_us; and when the adversary
+ * tires, all that was sent arrives.
  *
  * With one bit of the script the adversary also knows sessions: then it can say
  * anything to anybody, and only memory and bookkeeping must stay sound. */
@@ -31,6 +32,7 @@ struct end {
     struct life lives[LIVES];
     int life;                   /* the present one                          */
     int got;                    /* messages, in this life                   */
+    jl_u32 heard_at;            /* took something at this time              */
 };
 
 struct datagram {
@@ -46,7 +48,7 @@ struct world {
     struct datagram tape[TAPE]; /* all that was ever put out                */
     unsigned taped;
     int max_len, forging;
-    jl_u32 rto_us, ack_us, now;
+    jl_u32 rto_us, ack_us, silence_us, now;
 };
 
 /* --- sessions and messages ----------------------------------------------- */
@@ -91,6 +93,8 @@ static void begin_life(struct world *w, int i)
     config.slots = e->slots;
     config.rto_us = w->rto_us;
     config.ack_us = w->ack_us;
+    config.silence_us = w->silence_us;
+    config.beat_us = w->silence_us / 8;
     free(e->mem);
     e->mem = malloc((size_t)octets);
     FUZZ_HOLDS(jl_link_init(&e->link, &config, e->mem, octets - 1, w->now) ==
@@ -121,7 +125,8 @@ static void check_sound(const struct world *w, const struct end *e)
                apart(l->out_high, l->out_first));
     FUZZ_HOLDS(jl_link_timer(l, w->now) >= -1);
     FUZZ_HOLDS(l->failed == JL_OK || l->failed == JL_ECLOSED ||
-               l->failed == JL_EPEER);
+               l->failed == JL_EPEER ||
+               (l->failed == JL_ESILENT && w->silence_us > 0));
 }
 
 /* The life of the other end that this one is up with. */
@@ -189,7 +194,7 @@ static int do_recv(struct world *w, int i, int cap)
     else
         FUZZ_HOLDS(len == peeked);
     FUZZ_HOLDS(len >= 0 || len == JL_EAGAIN || len == JL_ETOOLONG ||
-               len == JL_ECLOSED || len == JL_EPEER);
+               len == JL_ECLOSED || len == e->link.failed);
     FUZZ_HOLDS(len <= w->max_len);
     if (!w->forging) {
         if (len >= 0) {
@@ -222,6 +227,19 @@ static void do_restart(struct world *w, int i)
     begin_life(w, i);
 }
 
+/* When nobody is heard for long, and not before, a link fails for silence. */
+static void do_judge(struct world *w, int i)
+{
+    jl_link *l = &w->end[i].link;
+    int failed = l->failed, status = jl_link_judge(l, w->now);
+
+    FUZZ_HOLDS(status == (l->failed == JL_ESILENT ? JL_ESILENT : JL_OK));
+    if (l->failed != failed) {
+        FUZZ_HOLDS(failed == JL_OK && status == JL_ESILENT);
+        FUZZ_HOLDS(apart(w->now, w->end[i].heard_at) >= w->silence_us);
+    }
+}
+
 /* --- what the carrier does ----------------------------------------------- */
 
 /* Anything goes in; a refusal is counted once, under its name. */
@@ -247,6 +265,8 @@ static int do_input(struct world *w, int i, const unsigned char *octets,
     FUZZ_HOLDS(!up || l->peer == peer);
     if (status <= JL_EMAGIC && status >= JL_ECRC)
         FUZZ_HOLDS(b.refused == a.refused + 1);
+    if (b.received > a.received)
+        w->end[i].heard_at = w->now;
     return status;
 }
 
@@ -426,6 +446,8 @@ static void operate(struct world *w)
             do_close(w, i);
         else if (which == 1)
             do_restart(w, i);
+        else
+            do_judge(w, i);
         break;
     case 8:                     /* a record, to whom it went or back */
         if (w->taped > 0) {
@@ -451,7 +473,8 @@ static void operate(struct world *w)
 
 /* --- the adversary tires ------------------------------------------------- */
 
-/* One of them has met another life of the other, and says no more. */
+/* One of them has met another life of the other, or has not heard it for too
+ * long, and says no more. */
 static int over(const struct world *w)
 {
     int i, n = 0;
@@ -471,11 +494,14 @@ static int arrived(const struct world *w, int i)
            other->got == e->lives[e->life].sent;
 }
 
+/* It has nothing to say but that it lives. */
 static int quiet(const struct world *w, int i)
 {
-    return jl_link_idle(&w->end[i].link) &&
-           jl_link_timer(&w->end[i].link, w->now) < 0 &&
-           jl_link_peek(&w->end[i].link) < 0;
+    const jl_link *l = &w->end[i].link;
+    long timer = jl_link_timer(l, w->now);
+
+    return jl_link_idle(l) && jl_link_peek(l) < 0 &&
+           (timer < 0 || (timer > 0 && l->up && w->silence_us > 0));
 }
 
 /* A perfect carrier, programs that receive all, and time that passes.  After
@@ -497,6 +523,8 @@ static void check_arrival(struct world *w)
         for (i = 0; i < 2; i++)
             while ((len = do_output(w, i, octets)) > 0)
                 (void)do_input(w, 1 - i, octets, len);
+        for (i = 0; i < 2; i++)
+            do_judge(w, i);
         for (i = 0; i < 2; i++) {
             timer = jl_link_timer(&w->end[i].link, w->now);
             if (timer >= 0 && (next < 0 || timer < next))
@@ -505,7 +533,7 @@ static void check_arrival(struct world *w)
         if (next > 0)
             w->now += (jl_u32)next;
     }
-    FUZZ_HOLDS(restarted || !over(w));
+    FUZZ_HOLDS(restarted || w->silence_us > 0 || !over(w));
     for (i = 0; i < 2 && !over(w); i++) {
         FUZZ_HOLDS(w->end[i].link.up);
         FUZZ_HOLDS(arrived(w, i));
@@ -530,6 +558,9 @@ int fuzz_link(const unsigned char *data, size_t size)
     w.end[1].slots = 1 + (first >> 1 & 1);
     w.rto_us = times[first >> 2 & 3];
     w.ack_us = (first >> 4 & 1) ? 0 : w.rto_us / 4;
+    w.silence_us = (first >> 6 & 1) ? 8 * w.rto_us : 0;
+    if (w.silence_us > (jl_u32)JL_LINK_MAX_US)
+        w.silence_us = (jl_u32)JL_LINK_MAX_US;
     w.max_len = some_len(&w);
     w.now = (first >> 5 & 1) ? 0u - 100000u : 0;
     for (i = 0; i < 2; i++)

@@ -42,7 +42,7 @@ struct bent {
 struct game {
     fuzz_script script;
     jl_loop *loop;
-    int npe;
+    int npe, topology;
     struct bent from[NODES][NODES];     /* [receiver][sender]               */
     struct bank bank[NODES];            /* the host's is the serial filter  */
     jl_u32 last_seq[NODES];
@@ -258,6 +258,7 @@ static void be_pe(struct game *g, int pe, jl_chan **to, jl_chan **from)
     config.pe = pe;
     config.npe = g->npe;
     config.owner = owner;
+    config.topology = g->topology;
     config.to = to;
     config.from = from;
     config.to_host = to[g->npe];
@@ -417,6 +418,7 @@ int fuzz_par(const unsigned char *data, size_t size)
     g.script.left = size;
     first = fuzz_octet(&g.script);
     g.npe = 1 + (int)(first % PES);
+    g.topology = (int)(first >> 2 & 3);
     g.loop = jl_loop_new(g.npe + 1, LONGEST, (int)(first >> 4) % 3);
     FUZZ_HOLDS(g.loop != NULL);
     FUZZ_HOLDS(jl_loop_run(g.loop, be_node, &g) == JL_OK);
