@@ -8,6 +8,7 @@
 #   make check      standards, layers, symbols, cross-builds
 #   make sanitize   every test under AddressSanitizer and UBSan
 #   make tsan       the tests of PEs on threads, under ThreadSanitizer
+#   make fuzz       libFuzzer over the decoders, SECONDS=60 for each
 #   make deps       install the packages that sim and test need
 #   make install    libraries, headers, program to $(DESTDIR)$(PREFIX)
 #   make clean
@@ -37,13 +38,13 @@ HAVE_LCM_GEN := $(shell command -v lcm-gen 2>/dev/null)
 PROGRAMS := $(if $(and $(HAVE_LCM),$(HAVE_JANSSON),$(HAVE_LCM_GEN),$(wildcard sim/main.c)),$(BUILD)/jumplink $(BUILD)/jumplink_f32)
 
 CORE_SRC := $(wildcard src/*/*.c)
-PORT_SRC := $(wildcard port/loop/*.c port/threads/*.c) $(if $(HAVE_LCM),$(wildcard port/lcm/*.c))
+PORT_SRC := $(wildcard port/loop/*.c port/threads/*.c port/skel/*.c) $(if $(HAVE_LCM),$(wildcard port/lcm/*.c))
 SIM_SRC := $(wildcard sim/*.c)
 GEN_SRC := $(patsubst sim/lcm/%.lcm,$(BUILD)/gen/jumplink_%.c,$(wildcard sim/lcm/*.lcm))
 LIBS := -Wl,--as-needed -llcm -ljansson -lm
 
 .PHONY: all lib deps sim test generated golden run-tests check sanitize tsan \
-    run-tsan install clean force
+    run-tsan fuzz install clean force
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -132,7 +133,7 @@ check: deps
 # tests/<folder>/test_x.c becomes $(BUILD)/tests/test_x and
 # $(BUILD)/tests_f32/test_x; other .c files help the tests of their folder.
 # A test knows the checkout (TOP_DIR) and its program (JUMPLINK) by macros.
-TEST_FOLDERS := unit golden conform program
+TEST_FOLDERS := unit golden conform program fuzz
 TESTING = $(HOST) -Isrc -Itests -I$(BUILD)/golden -DTOP_DIR='"$(CURDIR)"' \
     -DJUMPLINK='"$(abspath $(BUILD)/jumplink$(1))"'
 
@@ -169,6 +170,35 @@ run-tests: $(TESTS) $(PROGRAMS) lib
 # No fork: what ThreadSanitizer watches are threads.
 run-tsan: $(foreach t,conform_loop conform_threads par_loop par_threads,$(BUILD)/tests/test_$(t) $(BUILD)/tests_f32/test_$(t))
 	@sh tests/check/run_tests.sh $^
+
+# --- fuzzing -------------------------------------------------------------
+
+# tests/fuzz/fuzz_x.c becomes $(BUILD)/fuzz/x, whose function fuzz_x has the
+# name that libFuzzer calls.  Small frames: a long message is soon made.  What
+# it keeps is in $(BUILD)/fuzz/corpus, what breaks a promise in found/.
+SECONDS ?= 60
+FUZZ_TARGETS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_SRC := tests/fuzz/fuzz.c $(CORE_SRC) $(wildcard port/loop/*.c)
+FUZZING := $(HOST) -Isrc -Itests -O1 -g -fno-omit-frame-pointer \
+    -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
+    -DJL_FRAME_MAX=96 -include assert.h -DJL_ASSERT=assert
+
+fuzz:
+	@CC='$(CC)' sh tests/check/deps.sh fuzz
+	$(AGAIN) $(FUZZ_TARGETS:%=run-fuzz-%)
+
+run-fuzz-%: $(BUILD)/fuzz/% $(BUILD)/gen_seeds
+	@cd $(BUILD)/fuzz && mkdir -p found corpus/$* seeds/$*
+	@$(BUILD)/gen_seeds $(BUILD)/fuzz/seeds/$* <tests/fuzz/corpus/$*.hex
+	$(BUILD)/fuzz/$* -max_total_time=$(SECONDS) -max_len=1024 -verbosity=0 \
+	    -print_final_stats=1 -artifact_prefix=$(BUILD)/fuzz/found/$*- \
+	    $(BUILD)/fuzz/corpus/$* $(BUILD)/fuzz/seeds/$*
+
+$(BUILD)/fuzz/%: tests/fuzz/fuzz_%.c $(FUZZ_SRC) $(wildcard include/*/*.h src/*/*.h tests/fuzz/*.h)
+	@mkdir -p $(@D); echo '  $@'; \
+	    clang $(FUZZING) -Dfuzz_$*=LLVMFuzzerTestOneInput $(filter %.c,$^) -lm -o $@
+$(BUILD)/gen_seeds: tests/fuzz/gen_seeds.c tests/fuzz/fuzz.c $(BUILD)/libjumplink.a
+	@echo '  $@'; $(CC) $(HOST) $(CFLAGS) $^ -o $@
 
 # --- the rest ------------------------------------------------------------
 
