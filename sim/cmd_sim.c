@@ -73,6 +73,7 @@ static int one_run(struct flight_run *r, const struct model *model,
     }
     r->partial = status != 0;
     r->same = status == 0 && estimates_same(&serial, &r->e);
+    r->apart = status == 0 ? estimates_apart(&r->e, &serial) : (double)NAN;
     (void)estimates_times(&serial, &r->serial_us, &p99);
     estimates_close(&serial);
     return status;

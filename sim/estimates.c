@@ -102,6 +102,26 @@ int estimates_same(const struct estimates *a, const struct estimates *b)
         && same(a->loglik, b->loglik, rows);
 }
 
+double estimates_apart(const struct estimates *a, const struct estimates *b)
+{
+    double most = 0;
+    long row;
+    int i, n = b->n;
+
+    for (row = 0; row < b->rows; row++)
+        for (i = 0; i < n; i++) {
+            double x = (double)a->x[row * n + i], y = (double)b->x[row * n + i];
+            double apart = fabs(x - y)
+                / sqrt((double)b->P[(row * n + i) * n + i]);
+
+            if (isnan(x) != isnan(y))
+                return (double)NAN;
+            if (apart > most)
+                most = apart;
+        }
+    return most;
+}
+
 static int ascending(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;

@@ -35,6 +35,10 @@ void estimates_note(struct estimates *e, long row, const jl_real *x,
 /* 1 if all numbers of both have the same bits (times apart). */
 int estimates_same(const struct estimates *a, const struct estimates *b);
 
+/* The largest difference of a state in its sigma, sqrt(P) of b; NaN where only
+ * one of them has an estimate. */
+double estimates_apart(const struct estimates *a, const struct estimates *b);
+
 /* Median and 99th percentile of the time per step; number of steps. */
 long estimates_times(const struct estimates *e, double *median_us,
                      double *p99_us);
