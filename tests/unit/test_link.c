@@ -871,6 +871,38 @@ static void test_link_mends_a_loss_at_once(void **state)
     assert_true(idle());
 }
 
+/* However often the same piece is asked for, it is sent again a few times only,
+ * until it is acknowledged or its time is out. */
+static void test_link_heeds_few_asks(void **state)
+{
+    unsigned char out[JL_FRAME_MAX];
+    jl_link *l = &w.e[1].link;
+    int round, asked, sent;
+
+    (void)state;
+    up();
+    for (round = 0; round < 3; round++) {
+        assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
+        for (asked = sent = 0; asked < 20; asked++) {
+            while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
+                sent++;
+            forge(JL_FRAME_ACK, 0x1111, 0x2222, 1, (jl_u32)round, 0);
+        }
+        assert_in_range(sent, 3, 6);
+        if (round == 1) {               /* its time is out */
+            w.now += (jl_u32)jl_link_timer(l, w.now);
+            sent = 0;
+            while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
+                sent++;
+            forge(JL_FRAME_ACK, 0x1111, 0x2222, 1, (jl_u32)round, 0);
+            while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
+                sent++;
+            assert_int_equal(sent, 2);
+        }
+        forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, (jl_u32)round + 1, 0);
+    }
+}
+
 /* --- beat and silence ---------------------------------------------------- */
 
 /* Both ends up at w.now; end 1 with these times. */
@@ -1029,6 +1061,7 @@ static void test_link_hears(void **state)
 /* An end that was stopped for long, or comes seldom, has not listened. */
 static void test_link_absence_is_not_silence(void **state)
 {
+    unsigned char out[JL_FRAME_MAX];
     jl_link *l = &w.e[1].link;
     int i;
 
@@ -1059,6 +1092,17 @@ static void test_link_absence_is_not_silence(void **state)
     assert_false(listens_in_vain(SECONDS(9)));
     assert_int_equal(jl_link_silence(l, w.now), -1);
     assert_int_equal(jl_link_recv(l, msg, MAX_LEN), JL_ECLOSED);
+    /* ... but not while it owes us an acknowledgement */
+    up_with(0, 80000);
+    assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
+    assert_int_equal(forge(JL_FRAME_BYE, 0x1111, 0x2222, 0, 0, 0), JL_OK);
+    for (i = 1; i <= 80; i++) {
+        while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
+            ;
+        w.now += 1000;
+        assert_int_equal(jl_link_judge(l, w.now), i < 80 ? JL_OK : JL_ESILENT);
+    }
+    assert_true(jl_link_idle(l));
     /* one that never came is not silent either */
     begin(clean, 1);
     l->config.silence_us = 80000;
@@ -1508,6 +1552,7 @@ int main(void)
         cmocka_unit_test(test_link_asks_for_the_missing),
         cmocka_unit_test(test_link_does_not_ask_without_room),
         cmocka_unit_test(test_link_mends_a_loss_at_once),
+        cmocka_unit_test(test_link_heeds_few_asks),
         cmocka_unit_test(test_link_beats),
         cmocka_unit_test(test_link_notices_silence),
         cmocka_unit_test(test_link_hears),
