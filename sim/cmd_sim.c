@@ -96,6 +96,7 @@ static int one_run(struct flight_run *r, const struct model *model,
         status = run(&r->e, &r->traffic, model, data, options);
         progress_begin(NULL);
     }
+    r->partial = status != 0;
     r->same = status == 0 && estimates_same(&serial, &r->e);
     (void)estimates_times(&serial, &r->serial_us, &p99);
     estimates_close(&serial);
@@ -120,7 +121,10 @@ static int all_runs(struct flight_report *report, struct model *models,
                 : h == 1 && data->arrived != NULL ? HOLD_COLUMN : both[h];
             flight_run_name(r, &models[i], options->hold);
             status = one_run(r, &models[i], data, options);
-            report->count++;
+            if (status == 0 || r->e.done > 0)
+                report->count++;
+            else
+                estimates_close(&r->e);
         }
     return status;
 }
@@ -187,9 +191,13 @@ static int sim(const char *data_path, const char *const *paths, int count,
                                           2 * count) != 0)
         status = 1;
     else if (status == 0) {
+        int written = 0;
+
         status = all_runs(&report, models, count, options);
+        if (report.count > 0)
+            written = flight_report_write(&report, options->out);
         if (status == 0)
-            status = flight_report_write(&report, options->out);
+            status = written;
         flight_report_close(&report);
     }
     for (i = 0; i < read; i++)

@@ -3,8 +3,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "complain.h"
+#include "out_file.h"
 
 /* All NaNs have the same bits, so that files and comparisons agree. */
 static jl_real *nans(long count)
@@ -62,6 +64,7 @@ void estimates_note(struct estimates *e, long row, const jl_real *x,
     memcpy(e->mu + row * M, mu, (size_t)M * sizeof *mu);
     e->loglik[row] = loglik;
     e->us[row] = us;
+    e->done = row + 1;
 }
 
 static int same(const jl_real *a, const jl_real *b, long count)
@@ -115,10 +118,10 @@ static void put(FILE *out, jl_real v)
 }
 
 void estimates_write(const struct estimates *e, const struct data_file *data,
-                     FILE *out)
+                     int partial, FILE *out)
 {
     int n = e->n, a, b;
-    long row;
+    long row, rows = partial ? e->done : e->rows;
 
     fprintf(out, "%s%s", data->run != NULL ? "run," : "", data->time_name);
     for (a = 0; a < n; a++)
@@ -129,7 +132,7 @@ void estimates_write(const struct estimates *e, const struct data_file *data,
     for (a = 0; a < e->M; a++)
         fprintf(out, ",mu%d", a);
     fputs(",loglik\n", out);
-    for (row = 0; row < e->rows; row++) {
+    for (row = 0; row < rows; row++) {
         if (data->run != NULL)
             fprintf(out, "%ld,", data->run[row]);
         fputs(data->time_text[row], out);
@@ -143,4 +146,33 @@ void estimates_write(const struct estimates *e, const struct data_file *data,
         put(out, e->loglik[row]);
         fputc('\n', out);
     }
+    if (partial)
+        fprintf(out, "# partial: %ld of %ld rows\n", rows, e->rows);
+}
+
+int estimates_save_partial(const struct estimates *e,
+                           const struct data_file *data, const char *path)
+{
+    const char *to = path != NULL ? path : "-";
+    struct out_file out;
+    struct stat is;
+    char *name;
+    int status, beside;
+
+    if (e->done == 0)
+        return 0;
+    beside = strcmp(to, "-") != 0 && (stat(to, &is) != 0
+                                      || S_ISREG(is.st_mode));
+    if (asprintf(&name, "%s%s", to, beside ? ".partial" : "") < 0)
+        return complain(to, 0, NULL, "no memory");
+    status = out_open(&out, name);
+    if (status == 0) {
+        estimates_write(e, data, 1, out.stream);
+        status = out_close(&out, 1);
+    }
+    if (status == 0)
+        complain(beside ? name : "output", 0, NULL,
+                 "partial: the first %ld of %ld rows", e->done, e->rows);
+    free(name);
+    return status;
 }

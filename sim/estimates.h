@@ -8,7 +8,8 @@
 #include "model_file.h"
 
 struct estimates {
-    long rows;
+    long rows;                  /* of the record                            */
+    long done;                  /* behind the last with an estimate         */
     int n, M;
     jl_real *x;                 /* [rows,n]; NaN in rows without estimate   */
     jl_real *P;                 /* [rows,n,n]                               */
@@ -35,8 +36,16 @@ int estimates_same(const struct estimates *a, const struct estimates *b);
 long estimates_times(const struct estimates *e, double *median_us,
                      double *p99_us);
 
-/* As CSV: time (and run), x, P upper triangle, mu, loglik. */
+/* As CSV: time (and run), x, P upper triangle, mu, loglik; all rows, or, when
+ * `partial`, those that were done and a last line that says so. */
 void estimates_write(const struct estimates *e, const struct data_file *data,
-                     FILE *out);
+                     int partial, FILE *out);
+
+/* What a run that failed has done so far, to PATH.partial (or standard output,
+ * if path is NULL), and a word on standard error; nothing if it has done
+ * nothing.  What is at path stays as it is.  Returns 0, or -1 after a
+ * message. */
+int estimates_save_partial(const struct estimates *e,
+                           const struct data_file *data, const char *path);
 
 #endif

@@ -28,6 +28,11 @@ int lcm_node_open(struct lcm_node *node, int which, const char *url,
 /* What this node sent. */
 void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic);
 
+/* After a failure: the PE that has been silent for longest, and for half of the
+ * timeout at least; -1: none. */
+int lcm_node_silent(const struct lcm_node *node,
+                    const struct options *options);
+
 /* After a failure: if datagrams were refused, a line that says what that may
  * mean. */
 void lcm_node_hint(const struct lcm_node *node);

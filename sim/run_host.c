@@ -2,29 +2,38 @@
 #include "run.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "clock.h"
 #include "complain.h"
+#include "interrupt.h"
 #include "jumplink/par.h"
 #include "progress.h"
 
 int run_is_channels(int status)
 {
-    return status <= JL_ETIMEOUT;
+    return status <= JL_ETIMEOUT && status != JL_ECHAIN;
 }
 
-int run_failed(const struct data_file *data, long row, int status)
+int run_failed(const struct data_file *data, long row, int status,
+               int failed_pe)
 {
-    if (row < 0)
-        complain("PEs", 0, NULL, "the run does not start: %s%s",
-                 run_is_channels(status) && status != JL_EMODEL
-                 ? "no word from PE0: " : "",
+    char where[400] = "the run does not start", who[32] = "";
+
+    if (row >= 0)
+        snprintf(where, sizeof where, "the run ends at %s:%ld", data->path,
+                 data->line[row]);
+    if (failed_pe >= 0)
+        snprintf(who, sizeof who, "no word from PE%d: ", failed_pe);
+    else if (row < 0 && run_is_channels(status) && status != JL_EMODEL)
+        strcpy(who, "no word from PE0: ");
+    if (status == RUN_INTERRUPTED)
+        complain("interrupted", 0, NULL, "%s by %s", where, interrupted());
+    else if (row < 0 || run_is_channels(status))
+        complain("PEs", 0, NULL, "%s: %s%s", where, who,
                  jl_status_text(status));
-    else if (run_is_channels(status))
-        complain("PEs", 0, NULL, "the run ends at %s:%ld: %s", data->path,
-                 data->line[row], jl_status_text(status));
     else
         complain(data->path, data->line[row], NULL, "the step fails: %s",
                  jl_status_text(status));
@@ -35,7 +44,7 @@ int run_failed(const struct data_file *data, long row, int status)
 #define SLICE_US 100000L
 
 /* Receive within the deadline, in slices.  `estimate` NULL: the ready word. */
-static int receive(const struct run_host *host, jl_estimate *estimate,
+static int receive(struct run_host *host, jl_estimate *estimate,
                    jl_u32 fingerprint, const struct model *model,
                    unsigned char *buf, int cap, long timeout_us)
 {
@@ -49,15 +58,19 @@ static int receive(const struct run_host *host, jl_estimate *estimate,
             ? jl_host_ready(host->from, fingerprint, buf, cap, slice)
             : jl_host_recv(host->from, estimate, model->M, model->n, buf, cap,
                            slice);
+        if (status == JL_ETIMEOUT && interrupted() != NULL)
+            return RUN_INTERRUPTED;
         if (status == JL_ETIMEOUT && host->alive != NULL
             && !host->alive(host->context))
             return JL_ECLOSED;
     } while (status == JL_ETIMEOUT && left > 0);
+    if (status < 0 && estimate != NULL)
+        host->failed_pe = estimate->failed_pe;
     return status;
 }
 
 static int host_row(struct estimates *e, long row,
-                    const struct run_host *host, const jl_meas *meas,
+                    struct run_host *host, const jl_meas *meas,
                     jl_estimate *estimate, const struct model *model,
                     unsigned char *buf, int cap, long timeout_us)
 {
@@ -78,14 +91,16 @@ static int host_row(struct estimates *e, long row,
     return status;
 }
 
-/* The answer to a measurement may come as late as a PE's own deadline. */
+/* The answer to a measurement may come as late as the last deadline of a PE:
+ * no hop's level is beyond 2 pes (plan.h). */
 static long answer_us(const struct options *options)
 {
-    return options->timeout_us + 1000000;
+    return options->timeout_us + options->timeout_us / 8 * 2 * options->pes
+        + 1000000;
 }
 
 static int host_rows(struct estimates *e, long *row,
-                     const struct run_host *host, const struct model *model,
+                     struct run_host *host, const struct model *model,
                      const struct data_file *data,
                      const struct options *options, jl_estimate *estimate,
                      unsigned char *buf, int cap)
@@ -100,6 +115,8 @@ static int host_rows(struct estimates *e, long *row,
         if (feed_meas(&feed, *row, &meas))
             status = host_row(e, *row, host, &meas, estimate, model, buf, cap,
                               answer_us(options));
+        if (status == JL_OK && interrupted() != NULL)
+            status = RUN_INTERRUPTED;
         if (status != JL_OK)
             return status;
         progress(*row + 1, data->rows);
@@ -107,7 +124,7 @@ static int host_rows(struct estimates *e, long *row,
     return JL_OK;
 }
 
-int run_host(struct estimates *e, long *row, const struct run_host *host,
+int run_host(struct estimates *e, long *row, struct run_host *host,
              const struct model *model, const struct data_file *data,
              const struct options *options)
 {
@@ -117,6 +134,7 @@ int run_host(struct estimates *e, long *row, const struct run_host *host,
     jl_estimate estimate;
 
     *row = -1;
+    host->failed_pe = -1;
     if (buf == NULL || mem == NULL) {
         free(buf);
         free(mem);

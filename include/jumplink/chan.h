@@ -65,13 +65,13 @@ void jl_chan_init(jl_chan *chan, const jl_chan_ops *ops, int max_len,
 /* Send a message [len octets]; msg may be NULL if len is 0.
  * Returns JL_OK, JL_ETOOLONG (len > max_len), JL_ETIMEOUT, JL_ECLOSED,
  * JL_ERANGE (a negative len or timeout), or what else the port meets:
- * JL_EDEADLOCK, JL_EPEER, JL_EIO. */
+ * JL_EDEADLOCK, JL_EPEER, JL_ESILENT, JL_EIO. */
 int jl_chan_send(jl_chan *chan, const unsigned char *msg, int len,
                  long timeout_us);
 
 /* Receive a message into msg [cap octets]; msg may be NULL if cap is 0.
  * Returns its length >= 0, or JL_ETOOLONG (the message stays), JL_ETIMEOUT,
- * JL_ECLOSED, JL_ERANGE, JL_EDEADLOCK, JL_EPEER, JL_EIO. */
+ * JL_ECLOSED, JL_ERANGE, JL_EDEADLOCK, JL_EPEER, JL_ESILENT, JL_EIO. */
 int jl_chan_recv(jl_chan *chan, unsigned char *msg, int cap, long timeout_us);
 
 /* Wait for a message on one of n >= 1 channels to receive from.

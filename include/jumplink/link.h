@@ -10,11 +10,13 @@
  * that fit a frame; pieces are numbered from 0; up to `window` are under way;
  * the receiver takes them in order only and acknowledges by the number of the
  * next piece it waits for, on data that goes back anyway or, after ack_us or
- * half a window, in a frame of its own.  What is not acknowledged in time
- * (rto_us, doubled up to 16 times) is sent again: first one piece alone, and
- * when that is acknowledged, the rest.  A receiver without room drops what
- * comes, unacknowledged, and tells when there is room again; if that word is
- * lost, the sender's repetitions find out.
+ * half a window, in a frame of its own.  A piece ahead of a missing one is
+ * dropped, and the receiver asks at once to be sent the missing one and what
+ * follows.  What is not acknowledged in time (rto_us, doubled up to 16 times)
+ * is sent again: first one piece alone, and when that is acknowledged, the
+ * rest.  A receiver without room drops what comes, unacknowledged, and asks
+ * when there is room again.  If an asking is lost, the sender's repetitions
+ * find out.
  *
  * Sessions.  Each end has a session number, new for every start of the
  * program.  HELLO frames tell it to the other end, and the link is up only
@@ -23,6 +25,10 @@
  * hears of another session of the other end, it asks that session (DOUBT).
  * Only a living other end answers (ALIVE); then it has restarted, and the link
  * fails with JL_EPEER: what was under way cannot be known to have arrived.
+ *
+ * Silence.  An end that is up says something at least every beat_us until the
+ * other end knows that it has closed.  One that has listened for silence_us and
+ * heard nothing from the other end's session takes it for dead: JL_ESILENT.
  *
  * Times are unsigned microseconds modulo 2^32 of any clock that does not go
  * back; only differences count, so the wrap after 71 minutes is harmless.
@@ -46,6 +52,9 @@ typedef struct jl_link_config {
     jl_u32 rto_us;              /* first retransmission time, say 20000     */
     jl_u32 ack_us;              /* longest wait with an acknowledgement; well
                                    below rto_us, or much is sent twice      */
+    jl_u32 beat_us;             /* longest this end says nothing; 0: any    */
+    jl_u32 silence_us;          /* longest the other end may say nothing,
+                                   many of its beat_us; 0: any              */
 } jl_link_config;
 
 /* What happened on a link, counted since init. */
@@ -62,7 +71,7 @@ typedef struct jl_link_count {
     unsigned long stale;        /* frames of or for another session         */
 } jl_link_count;
 
-/* Longest rto_us and ack_us: 67 s. */
+/* Longest of the times in a jl_link_config: 67 s. */
 #define JL_LINK_MAX_US 67108864L
 
 /* Pieces a message of len octets is cut into. */
@@ -81,7 +90,8 @@ typedef struct jl_link {
     int window;                 /* pieces held each way                     */
     jl_u32 peer;                /* the other end's session; 0: unknown      */
     int up;                     /* both ends know each other                */
-    int failed;                 /* JL_OK, JL_EPEER; JL_ECLOSED: BYE came    */
+    int failed;                 /* JL_OK, JL_EPEER, JL_ESILENT;
+                                   JL_ECLOSED: BYE came                     */
     int closing;                /* we closed: the last piece is BYE         */
     unsigned char *out;         /* ring of pieces not acknowledged          */
     int out_slot;               /* where in the ring the oldest lies        */
@@ -100,10 +110,16 @@ typedef struct jl_link {
     jl_u32 due_at;              /* since when                               */
     int ack_now;                /* acknowledge without waiting              */
     int room_lacked;            /* a piece was dropped for want of room     */
-    int room_now;               /* tell that there is room again            */
+    int ask_now;                /* ask for the pieces from in_next on       */
+    int in_gap;                 /* have asked; the piece has not come since */
+    jl_u32 in_early;            /* highest piece seen since then            */
     int hello_now;              /* send HELLO without waiting               */
     jl_u32 doubt;               /* session to send DOUBT to; 0: none        */
     jl_u32 alive;               /* session to send ALIVE to; 0: none        */
+    jl_u32 said_at;             /* when we last said anything               */
+    jl_u32 heard_at;            /* when the other end was last heard        */
+    jl_u32 listened_at;         /* until when listening has been counted    */
+    jl_u32 unheard_us;          /* listened so long since heard_at          */
     jl_link_count count;
 } jl_link;
 
@@ -116,12 +132,13 @@ int jl_link_init(jl_link *link, const jl_link_config *config,
 
 /* Take a message to be sent [len], also before the link is up.
  * Returns JL_OK, JL_EAGAIN (no room before more is acknowledged),
- * JL_ETOOLONG, JL_ECLOSED (either end has closed), JL_EPEER. */
+ * JL_ETOOLONG, JL_ECLOSED (either end has closed), JL_EPEER, JL_ESILENT. */
 int jl_link_send(jl_link *link, const unsigned char *msg, int len);
 
 /* Fetch the oldest whole message into msg [cap].
  * Returns its length, JL_EAGAIN (none yet), JL_ETOOLONG (it stays),
- * JL_ECLOSED (the other end closed and all is fetched), JL_EPEER. */
+ * and when all is fetched JL_ECLOSED (the other end closed), JL_EPEER,
+ * JL_ESILENT. */
 int jl_link_recv(jl_link *link, unsigned char *msg, int cap);
 
 /* Length of the message that recv would return, or recv's error. */
@@ -142,8 +159,22 @@ int jl_link_input(jl_link *link, const unsigned char *datagram, int len,
 int jl_link_output(jl_link *link, unsigned char *datagram, int cap,
                    jl_u32 now);
 
-/* Microseconds until jl_link_output may have something by time alone: 0 for
- * now; -1 for not before something comes in or is sent. */
+/* Judge the other end's silence.  Call it only when all that waits at the
+ * carrier has been given to jl_link_input; best, after every time that was done
+ * and before jl_link_timer is asked.
+ * Between two calls at most silence_us / 8 counts as listening: an end that was
+ * stopped, or computed, does not take for silence what it did not hear, even
+ * where the carrier needs a moment to hand over what came meanwhile.
+ * Returns JL_OK, or JL_ESILENT if the link has failed so, now or before. */
+int jl_link_judge(jl_link *link, jl_u32 now);
+
+/* Microseconds since the other end was last heard, listening or not (after
+ * 67 s: JL_LINK_MAX_US); -1 if the link is not up, unless it has failed for
+ * silence, or the other end closed. */
+long jl_link_silence(const jl_link *link, jl_u32 now);
+
+/* Microseconds until jl_link_output or jl_link_judge may have something by time
+ * alone: 0 for now; -1 for not before something comes in or is sent. */
 long jl_link_timer(const jl_link *link, jl_u32 now);
 
 /* Close this end: no more send; what was sent is still delivered, and what the

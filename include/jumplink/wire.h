@@ -61,8 +61,8 @@ typedef struct jl_frame {
     jl_u32 session;             /* the sender's session                     */
     jl_u32 peer;                /* the receiver's session, as the sender
                                    knows it; 0: not yet                     */
-    jl_u32 seq;                 /* number of this piece; ACK: 1 if there is
-                                   room again for what was dropped          */
+    jl_u32 seq;                 /* number of this piece; ACK: 1 to be sent
+                                   what was lost or dropped, from ack on    */
     jl_u32 ack;                 /* the next piece the sender waits for      */
     const unsigned char *payload;
     int len;                    /* octets of payload, 0 to JL_FRAME_PAYLOAD */

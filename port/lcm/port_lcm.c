@@ -14,9 +14,8 @@
 
 #include <lcm/lcm.h>
 
-#define RTO_US 20000
-#define ACK_US 5000
-#define QUIET_US (3 * RTO_US)
+#define ACK_PART 4              /* an acknowledgement waits rto_us / 4      */
+#define QUIET_PARTS 12          /* time for repetitions after 1, 3, 7 rto_us */
 #define HANDLE_MAX 64           /* messages between two looks at the clock  */
 #define RUN_MAX 16
 #define NODES_MAX 256
@@ -46,8 +45,8 @@ struct jl_lcm {
     struct pollfd readable;
     int node, nodes;
     struct peer *peers;         /* [nodes]; our own is not used             */
-    double drop;
-    jl_u32 noise;               /* state of the generator for drop          */
+    jl_u32 rto_us;
+    const jl_lcm_carrier *carrier;
     unsigned long strays;       /* messages that belong to no link          */
 };
 
@@ -67,37 +66,40 @@ static jl_u32 link_time(long long now)
 
 /* --- what goes out ------------------------------------------------------ */
 
-static int dropped(jl_lcm *l)
+/* A publish that fails is a lost datagram. */
+static void publish(jl_lcm *l, int to, const unsigned char *datagram, int len)
 {
-    l->noise ^= l->noise << 13;
-    l->noise ^= l->noise >> 17;
-    l->noise ^= l->noise << 5;
-    return l->noise < l->drop * 4294967296.0;
+    lcm_publish(l->lcm, l->peers[to].channel, datagram, (unsigned)len);
 }
 
-/* Send all that is due.  A publish that fails is a lost datagram. */
+/* Send all that is due. */
 static void flush(jl_lcm *l)
 {
+    const jl_lcm_carrier *carrier = l->carrier;
     unsigned char datagram[JL_FRAME_MAX];
     jl_u32 now = link_time(clock_us());
     int i, len;
 
     for (i = 0; i < l->nodes; i++) {
-        struct peer *p = &l->peers[i];
-
         if (i == l->node)
             continue;
-        while ((len = jl_link_output(&p->link, datagram, sizeof datagram,
-                                     now)) > 0)
-            if (l->drop <= 0 || !dropped(l))
-                lcm_publish(l->lcm, p->channel, datagram, (unsigned)len);
+        while ((len = jl_link_output(&l->peers[i].link, datagram,
+                                     sizeof datagram, now)) > 0)
+            if (carrier == NULL)
+                publish(l, i, datagram, len);
+            else
+                carrier->put(carrier->context, i, datagram, len, now);
     }
+    while (carrier != NULL
+           && (len = carrier->get(carrier->context, &i, datagram, now)) > 0)
+        publish(l, i, datagram, len);
 }
 
-/* Microseconds until a link wants to send by time alone; -1: none does. */
+/* Microseconds until there is something to do by time alone; -1: never. */
 static long next_timer(const jl_lcm *l, long long now)
 {
-    long next = -1;
+    long next = l->carrier == NULL
+        ? -1 : l->carrier->timer(l->carrier->context, link_time(now));
     int i;
 
     for (i = 0; i < l->nodes; i++) {
@@ -151,6 +153,19 @@ static int take_in(jl_lcm *l)
     return n;
 }
 
+/* Take in, and only then judge who is silent.  LCM's thread may still be about
+ * to hand over what came while we were stopped: the link allows for that. */
+static int listen_in(jl_lcm *l)
+{
+    int n = take_in(l), i;
+    jl_u32 now = link_time(clock_us());
+
+    for (i = 0; i < l->nodes && n >= 0 && n < HANDLE_MAX; i++)
+        if (i != l->node)
+            jl_link_judge(&l->peers[i].link, now);
+    return n;
+}
+
 /* Keep all links going, and if nothing has come in, block until something
  * does, a link's timer, or the deadline.
  * There is no spinning: it takes the core from LCM's reader thread, and made a
@@ -162,7 +177,7 @@ static int turn(jl_lcm *l, long long deadline)
     int n;
 
     flush(l);
-    n = take_in(l);
+    n = listen_in(l);
     now = clock_us();
     if (n == 0 && now < deadline) {
         long us = next_timer(l, now);
@@ -170,7 +185,7 @@ static int turn(jl_lcm *l, long long deadline)
         if (deadline != NEVER && (us < 0 || deadline - now < us))
             us = (long)(deadline - now);
         await_message(l, us);
-        n = take_in(l);
+        n = listen_in(l);
     }
     if (n < 0)
         return JL_EIO;
@@ -261,6 +276,9 @@ static const char *wrong_with(const jl_lcm_config *c)
         || JL_LINK_PIECES(c->max_len)
                > INT_MAX / 4 / JL_LINK_PIECE / c->slots)
         return "length or number of messages out of range";
+    if (c->rto_us > JL_LINK_MAX_US || c->beat_us > JL_LINK_MAX_US
+        || c->silence_us > JL_LINK_MAX_US)
+        return "time out of range: at most 67 s";
     return NULL;
 }
 
@@ -298,8 +316,10 @@ static int peer_init(jl_lcm *l, int node, const jl_lcm_config *c,
     link.session = session;
     link.max_len = c->max_len;
     link.slots = slots;
-    link.rto_us = RTO_US;
-    link.ack_us = ACK_US;
+    link.rto_us = l->rto_us;
+    link.ack_us = l->rto_us / ACK_PART;
+    link.beat_us = c->beat_us;
+    link.silence_us = c->silence_us;
     p->mem = malloc((size_t)octets);
     if (p->mem == NULL
         || jl_link_init(&p->link, &link, p->mem, octets,
@@ -381,10 +401,8 @@ static const char *join(jl_lcm *l, const jl_lcm_config *c)
 
     l->node = c->node;
     l->nodes = c->nodes;
-    l->drop = c->drop;
-    l->noise = (c->seed * 2654435761U) ^ ((unsigned)c->node + 1) * 40503U;
-    if (l->noise == 0)
-        l->noise = 1;
+    l->rto_us = c->rto_us != 0 ? c->rto_us : JL_LCM_RTO;
+    l->carrier = c->carrier;
     l->peers = calloc((size_t)c->nodes, sizeof *l->peers);
     if (l->peers == NULL)
         return "no memory";
@@ -458,7 +476,7 @@ void jl_lcm_close(jl_lcm *lcm, long linger_us)
     }
     /* A peer whose BYE we have acknowledged, but the acknowledgement was lost,
      * repeats it: stay to answer, unless nothing was ever lost. */
-    end = clock_us() + QUIET_US;
+    end = clock_us() + QUIET_PARTS * (long long)lcm->rto_us;
     while (lossy(lcm) || !every_link(lcm, closed))
         if (turn(lcm, end) != JL_OK)
             break;
@@ -485,6 +503,13 @@ jl_chan *jl_lcm_rx(jl_lcm *lcm, int node)
     struct peer *p = peer_at(lcm, node);
 
     return p == NULL ? NULL : &p->rx.chan;
+}
+
+long jl_lcm_silence(const jl_lcm *lcm, int node)
+{
+    if (node < 0 || node >= lcm->nodes || node == lcm->node)
+        return -1;
+    return jl_link_silence(&lcm->peers[node].link, link_time(clock_us()));
 }
 
 jl_link_count jl_lcm_count(const jl_lcm *lcm)

@@ -10,7 +10,9 @@ static int config_is_good(const jl_link_config *c)
            c->slots >= 1 &&
            c->slots <= INT_MAX / 2 / JL_LINK_PIECE / JL_LINK_PIECES(c->max_len)
            && c->rto_us >= 1 && c->rto_us <= (jl_u32)JL_LINK_MAX_US &&
-           c->ack_us <= (jl_u32)JL_LINK_MAX_US;
+           c->ack_us <= (jl_u32)JL_LINK_MAX_US &&
+           c->beat_us <= (jl_u32)JL_LINK_MAX_US &&
+           c->silence_us <= (jl_u32)JL_LINK_MAX_US;
 }
 
 int jl_link_init(jl_link *link, const jl_link_config *config,
@@ -102,7 +104,7 @@ int jl_link_recv(jl_link *link, unsigned char *msg, int cap)
     /* At half a ring, not at once: the sender will send all it has. */
     if (link->room_lacked && link->in_held <= link->window / 2) {
         link->room_lacked = 0;
-        link->room_now = 1;
+        link->ask_now = 1;
     }
     return len;
 }

@@ -23,7 +23,7 @@ static void take_ack(jl_link *link, const jl_frame *frame, jl_u32 now)
         link->sent_at = now;
     }
     if (frame->kind == JL_FRAME_ACK && frame->seq == 1)
-        link->out_next = link->out_first;       /* room again: do not wait */
+        link->out_next = link->out_first;       /* asked: do not wait */
 }
 
 /* Every piece of a message but the last is full, so that a message cannot
@@ -35,6 +35,20 @@ static int fits(const jl_link *link, const jl_frame *frame)
     if (frame->kind == JL_FRAME_DATA)
         return frame->len == JL_FRAME_PAYLOAD && frame->len < left;
     return frame->len <= left;
+}
+
+/* A piece ahead of a missing one, which is asked for at once; again only when
+ * the sender has started again, for its pieces do not go up, and it is missing
+ * again.  Not for want of room: then recv asks. */
+static void ask_for_missing(jl_link *link, jl_u32 seq)
+{
+    jl_u32 beyond = jli_ahead(seq, link->in_early);
+
+    if (link->room_lacked)
+        return;
+    if (!link->in_gap || beyond == 0 || beyond > (jl_u32)0x7FFFFFFFUL)
+        link->in_gap = link->ask_now = 1;
+    link->in_early = seq;
 }
 
 static int take_piece(jl_link *link, const jl_frame *frame, jl_u32 now)
@@ -52,8 +66,10 @@ static int take_piece(jl_link *link, const jl_frame *frame, jl_u32 now)
         link->room_lacked = 1;
         return refuse(&link->count.early, JL_EAGAIN);
     }
-    if (ahead > 0)
+    if (ahead > 0) {
+        ask_for_missing(link, frame->seq);
         return refuse(&link->count.early, JL_EORDER);
+    }
     if (!bye && !fits(link, frame))
         return refuse(&link->count.refused, JL_ELENGTH);
 
@@ -68,7 +84,7 @@ static int take_piece(jl_link *link, const jl_frame *frame, jl_u32 now)
     }
     link->count.received++;
     link->in_next = jli_after(link->in_next, 1);
-    link->room_lacked = 0;
+    link->room_lacked = link->in_gap = 0;
     if (link->ack_due++ == 0)
         link->due_at = now;
     if (bye || 2 * link->ack_due >= link->window)
@@ -126,11 +142,13 @@ int jl_link_input(jl_link *link, const unsigned char *datagram, int len,
     if (frame.session != link->peer)
         return meet_stranger(link, &frame, knows_us);
     if (frame.kind == JL_FRAME_HELLO) {
+        jli_heard(link, now);
         link->ack_now = 1;      /* it is not up yet: any frame brings it up */
         return JL_OK;
     }
     if (!knows_us || frame.kind == JL_FRAME_ALIVE)
         return refuse(&link->count.stale, JL_EPEER);
+    jli_heard(link, now);
     take_ack(link, &frame, now);
     return frame.kind == JL_FRAME_ACK ? JL_OK : take_piece(link, &frame, now);
 }

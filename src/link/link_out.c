@@ -3,14 +3,7 @@
 
 #define HELLO_MAX_US ((jl_u32)100000L)
 #define BACKOFF_MAX 16
-
-/* Microseconds left of `wait` since `since`. */
-static jl_u32 left(jl_u32 since, jl_u32 wait, jl_u32 now)
-{
-    jl_u32 passed = jli_ahead(now, since);
-
-    return passed < wait ? wait - passed : 0;
-}
+#define NEVER ((jl_u32)0xFFFFFFFFUL)
 
 /* Something to transmit?  After a timeout one piece goes alone: if the other
  * end has no room, the rest would be sent in vain. */
@@ -42,7 +35,7 @@ static int put(const jl_link *link, int kind, jl_u32 peer, jl_u32 seq,
 static int hello(jl_link *link, unsigned char *datagram, jl_u32 now)
 {
     if (!link->hello_now) {
-        if (left(link->sent_at, link->wait_us, now) > 0)
+        if (jli_left(link->sent_at, link->wait_us, now) > 0)
             return 0;
         if (link->wait_us < HELLO_MAX_US / 2)
             link->wait_us *= 2;
@@ -78,22 +71,24 @@ static int transmit(jl_link *link, unsigned char *datagram, jl_u32 now)
 
 static int acknowledge(jl_link *link, unsigned char *datagram)
 {
-    jl_u32 room = (jl_u32)link->room_now;
+    jl_u32 ask = (jl_u32)link->ask_now;
 
-    link->ack_due = link->ack_now = link->room_now = 0;
+    link->ack_due = link->ack_now = link->ask_now = 0;
     link->count.acks++;
-    return put(link, JL_FRAME_ACK, link->peer, room, NULL, 0, datagram);
+    return put(link, JL_FRAME_ACK, link->peer, ask, NULL, 0, datagram);
 }
 
-int jl_link_output(jl_link *link, unsigned char *datagram, int cap,
-                   jl_u32 now)
+/* Until the other end knows that we have closed, it listens for us. */
+static int beats(const jl_link *link)
+{
+    return link->config.beat_us > 0 &&
+           !(link->closing && link->out_first == link->out_end);
+}
+
+static int next_frame(jl_link *link, unsigned char *datagram, jl_u32 now)
 {
     jl_u32 peer = link->doubt;
 
-    if (cap < JL_FRAME_MAX)
-        return JL_ENOMEM;
-    if (jli_over(link))
-        return 0;
     if (link->alive != 0) {
         peer = link->alive;
         link->alive = 0;
@@ -106,25 +101,46 @@ int jl_link_output(jl_link *link, unsigned char *datagram, int cap,
     if (!link->up)
         return hello(link, datagram, now);
     if (link->out_next != link->out_first &&
-        left(link->sent_at, link->wait_us, now) == 0) {
+        jli_left(link->sent_at, link->wait_us, now) == 0) {
         link->out_next = link->out_first;
         if (link->wait_us < BACKOFF_MAX * link->config.rto_us)
             link->wait_us *= 2;
     }
     if (has_piece(link))
         return transmit(link, datagram, now);
-    if (link->ack_now || link->room_now ||
+    if (link->ack_now || link->ask_now ||
         (link->ack_due > 0 &&
-         left(link->due_at, link->config.ack_us, now) == 0))
+         jli_left(link->due_at, link->config.ack_us, now) == 0) ||
+        (beats(link) &&
+         jli_left(link->said_at, link->config.beat_us, now) == 0))
         return acknowledge(link, datagram);
     return 0;
 }
 
+int jl_link_output(jl_link *link, unsigned char *datagram, int cap,
+                   jl_u32 now)
+{
+    int len;
+
+    if (cap < JL_FRAME_MAX)
+        return JL_ENOMEM;
+    if (jli_over(link))
+        return 0;
+    len = next_frame(link, datagram, now);
+    if (len > 0)
+        link->said_at = now;
+    return len;
+}
+
+static jl_u32 sooner(jl_u32 a, jl_u32 b)
+{
+    return a < b ? a : b;
+}
+
 long jl_link_timer(const jl_link *link, jl_u32 now)
 {
-    jl_u32 resend = left(link->sent_at, link->wait_us, now);
-    jl_u32 ack = left(link->due_at, link->config.ack_us, now);
-    int waiting = link->out_next != link->out_first;
+    jl_u32 resend = jli_left(link->sent_at, link->wait_us, now);
+    jl_u32 next = NEVER;
 
     if (jli_over(link))
         return -1;
@@ -132,9 +148,17 @@ long jl_link_timer(const jl_link *link, jl_u32 now)
         return 0;
     if (!link->up)
         return link->hello_now ? 0 : (long)resend;
-    if (has_piece(link) || link->ack_now || link->room_now)
+    if (has_piece(link) || link->ack_now || link->ask_now)
         return 0;
-    if (link->ack_due > 0 && !(waiting && resend < ack))
-        return (long)ack;
-    return waiting ? (long)resend : -1;
+    if (link->out_next != link->out_first)
+        next = resend;
+    if (link->ack_due > 0)
+        next = sooner(next, jli_left(link->due_at, link->config.ack_us, now));
+    if (beats(link))
+        next = sooner(next, jli_left(link->said_at, link->config.beat_us,
+                                     now));
+    if (jli_listens(link))
+        next = sooner(next, jli_left(link->listened_at, jli_listen_us(link),
+                                     now));
+    return next == NEVER ? -1 : (long)next;
 }

@@ -18,11 +18,37 @@ JL_INLINE jl_u32 jli_after(jl_u32 seq, int n)
     return (seq + (jl_u32)n) & (jl_u32)0xFFFFFFFFUL;
 }
 
+/* Microseconds left of `wait` since `since`. */
+JL_INLINE jl_u32 jli_left(jl_u32 since, jl_u32 wait, jl_u32 now)
+{
+    jl_u32 passed = jli_ahead(now, since);
+
+    return passed < wait ? wait - passed : 0;
+}
+
 /* A link that shall not say anything any more.  One whose other end has
  * closed is still up: it acknowledges, and delivers what it had to send. */
 JL_INLINE int jli_over(const jl_link *link)
 {
     return link->failed != JL_OK && !link->up;
+}
+
+/* A link whose other end has to be heard now and then. */
+JL_INLINE int jli_listens(const jl_link *link)
+{
+    return link->config.silence_us > 0 && link->up && link->failed == JL_OK;
+}
+
+/* The longest between two calls of jl_link_judge that counts as listening. */
+JL_INLINE jl_u32 jli_listen_us(const jl_link *link)
+{
+    return link->config.silence_us / 8 + 1;
+}
+
+JL_INLINE void jli_heard(jl_link *link, jl_u32 now)
+{
+    link->heard_at = link->listened_at = now;
+    link->unheard_us = 0;
 }
 
 /* A piece in a ring, `ahead` behind the oldest.  The ring's index is kept

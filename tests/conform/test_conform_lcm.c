@@ -1,5 +1,5 @@
 /* The channel contract between processes that talk by LCM, in a network of
- * this test's own; the same with a third of all datagrams thrown away. */
+ * this test's own. */
 #include "close.h"
 #include "conform.h"
 #include "lcm/port_lcm.h"
@@ -18,11 +18,12 @@
 #define URL "udpm://239.255.76.67:7667?ttl=0"
 #define CHILD_SECONDS 30U
 #define LINGER_US 1000000L
-#define LOSSY_LINGER_US 10000000L       /* several repetitions, backing off */
+#define BEAT_US 20000
+#define SILENCE_US 800000L
 
 static int net_errno;           /* why there is no network; 0: there is one */
 static jl_lcm *lcm;             /* this process's node                      */
-static double drop;
+static int watched;             /* all beat, and node 0 listens for it     */
 static char run_name[16];       /* new for each run                         */
 
 static jl_chan *tx(int from, int to)
@@ -83,7 +84,7 @@ static int child_failed(pid_t child)
 
 static jl_lcm_config config_of(int node, int nodes)
 {
-    jl_lcm_config c;
+    jl_lcm_config c = { 0 };
 
     c.url = URL;
     c.run = run_name;
@@ -92,8 +93,8 @@ static jl_lcm_config config_of(int node, int nodes)
     c.number = JL_REAL_OCTETS;
     c.max_len = lcm_port.max_len;
     c.slots = lcm_port.slots;
-    c.drop = drop;
-    c.seed = 5;
+    c.beat_us = watched ? BEAT_US : 0;
+    c.silence_us = watched && node == 0 ? SILENCE_US : 0;
     return c;
 }
 
@@ -116,7 +117,7 @@ static pid_t start(int node, int nodes, conform_body body)
     if (child == 0) {
         join(node, nodes);
         body(node);
-        jl_lcm_close(lcm, drop > 0 ? LOSSY_LINGER_US : LINGER_US);
+        jl_lcm_close(lcm, LINGER_US);
         _exit(conform_failures() != 0);
     }
     return child;
@@ -144,71 +145,22 @@ static int run(int n, conform_body body)
 
 /* --- the contract -------------------------------------------------------- */
 
-static void all_cases(void)
+static void test_conform_lcm(void **state)
 {
     const conform_case *c;
     int failed = 0;
 
+    (void)state;
+    need_net();
     for (c = conform_cases; c->name != NULL; c++)
         if (run(c->n, c->body) != 0) {
-            print_error("failed: %s, drop %g\n", c->name, drop);
+            print_error("failed: %s\n", c->name);
             failed++;
         }
     assert_int_equal(failed, 0);
 }
 
-static void test_conform_lcm(void **state)
-{
-    (void)state;
-    need_net();
-    drop = 0;
-    lcm_port.max_len = 3000;
-    lcm_port.step = 1;
-    lcm_port.rounds = 20;
-    all_cases();
-}
-
-static void test_conform_lcm_lossy(void **state)
-{
-    (void)state;
-    need_net();
-    drop = 0.3;
-    lcm_port.max_len = 2000;
-    lcm_port.step = 333;
-    lcm_port.rounds = 1;
-    all_cases();
-    drop = 0;
-}
-
 /* --- what only this port can meet ---------------------------------------- */
-
-/* The losses of the case above were real. */
-static void count_losses(int pe)
-{
-    int i;
-
-    for (i = 0; i < 20; i++)
-        if (pe == 0)
-            EXPECT(jl_chan_send(tx(0, 1), NULL, 0, LONG_US), ==, JL_OK);
-        else
-            EXPECT(jl_chan_recv(rx(0, 1), NULL, 0, LONG_US), ==, 0);
-    if (pe == 0) {
-        EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, LONG_US), ==, JL_ECLOSED);
-        EXPECT(jl_lcm_count(lcm).resent, >, 0);
-    }
-}
-
-static void test_lcm_drop_drops(void **state)
-{
-    int failed;
-
-    (void)state;
-    need_net();
-    drop = 0.3;
-    failed = run(2, count_losses);
-    drop = 0;
-    assert_int_equal(failed, 0);
-}
 
 /* Octets of no sense, frames of nobody, an own echo: counted, and no harm. */
 static void among_strangers(int pe)
@@ -291,6 +243,86 @@ static void test_lcm_restart(void **state)
     assert_int_equal(child_failed(child), 0);
 }
 
+/* A node that hangs is missed; one that only waits is not. */
+static void misses_the_other(int pe)
+{
+    (void)pe;
+    EXPECT(jl_lcm_silence(lcm, 1), ==, -1);
+    EXPECT(jl_lcm_silence(lcm, 2), ==, -1);
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, LONG_US), ==, 0);
+    EXPECT(jl_lcm_silence(lcm, 1), >=, 0);
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, LONG_US), ==, 0);
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, JL_FOREVER), ==, JL_ESILENT);
+    EXPECT(jl_chan_send(tx(0, 1), NULL, 0, LONG_US), ==, JL_ESILENT);
+    EXPECT(jl_lcm_silence(lcm, 1), ==, -1);
+}
+
+static void waits_and_hangs(int pe)
+{
+    (void)pe;
+    EXPECT(jl_chan_send(tx(1, 0), NULL, 0, LONG_US), ==, JL_OK);
+    EXPECT(jl_chan_recv(rx(0, 1), NULL, 0, 2 * SILENCE_US), ==, JL_ETIMEOUT);
+    EXPECT(jl_chan_send(tx(1, 0), NULL, 0, LONG_US), ==, JL_OK);
+    raise(SIGSTOP);
+}
+
+static void test_lcm_silence(void **state)
+{
+    pid_t hung;
+
+    (void)state;
+    need_net();
+    watched = 1;
+    new_run();
+    hung = start(1, 2, waits_and_hangs);
+    assert_int_equal(child_failed(start(0, 2, misses_the_other)), 0);
+    kill(hung, SIGKILL);
+    waitpid(hung, NULL, 0);
+    watched = 0;
+}
+
+/* One that was stopped itself blames nobody. */
+static void is_stopped(int pe)
+{
+    (void)pe;
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, LONG_US), ==, 0);
+    raise(SIGSTOP);
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, 2 * SILENCE_US), ==, JL_ETIMEOUT);
+    raise(SIGSTOP);
+    EXPECT(jl_chan_send(tx(0, 1), NULL, 0, LONG_US), ==, JL_OK);
+    EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, LONG_US), ==, 0);
+}
+
+static void waits_for_it(int pe)
+{
+    (void)pe;
+    EXPECT(jl_chan_send(tx(1, 0), NULL, 0, LONG_US), ==, JL_OK);
+    EXPECT(jl_chan_recv(rx(0, 1), NULL, 0, LONG_US), ==, 0);
+    EXPECT(jl_chan_send(tx(1, 0), NULL, 0, LONG_US), ==, JL_OK);
+}
+
+static void test_lcm_stopped_is_not_silence(void **state)
+{
+    pid_t stopped, other;
+    int i, status = 0;
+
+    (void)state;
+    need_net();
+    watched = 1;
+    new_run();
+    stopped = start(0, 2, is_stopped);
+    other = start(1, 2, waits_for_it);
+    for (i = 0; i < 2; i++) {
+        assert_int_equal(waitpid(stopped, &status, WUNTRACED), stopped);
+        assert_true(WIFSTOPPED(status));
+        usleep(2 * SILENCE_US);
+        kill(stopped, SIGCONT);
+    }
+    assert_int_equal(child_failed(stopped), 0);
+    assert_int_equal(child_failed(other), 0);
+    watched = 0;
+}
+
 /* All leave at once when nothing was lost: nobody lingers. */
 static void leave(int pe)
 {
@@ -344,7 +376,7 @@ static void test_lcm_refuses(void **state)
 
     (void)state;
     strcpy(run_name, "x");
-    for (i = 0; i < 13; i++) {
+    for (i = 0; i < 16; i++) {
         c = config_of(0, 2);
         switch (i) {
         case 0: c.url = NULL; break;
@@ -360,6 +392,9 @@ static void test_lcm_refuses(void **state)
         case 10: c.max_len = -1; break;
         case 11: c.slots = 0; break;
         case 12: c.max_len = INT_MAX; break;
+        case 13: c.rto_us = JL_LINK_MAX_US + 1; break;
+        case 14: c.beat_us = JL_LINK_MAX_US + 1; break;
+        case 15: c.silence_us = JL_LINK_MAX_US + 1; break;
         }
         why = NULL;
         assert_null(jl_lcm_open(&c, &why));
@@ -404,10 +439,10 @@ int main(void)
 {
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_conform_lcm),
-        cmocka_unit_test(test_conform_lcm_lossy),
-        cmocka_unit_test(test_lcm_drop_drops),
         cmocka_unit_test(test_lcm_strangers),
         cmocka_unit_test(test_lcm_restart),
+        cmocka_unit_test(test_lcm_silence),
+        cmocka_unit_test(test_lcm_stopped_is_not_silence),
         cmocka_unit_test(test_lcm_close_is_quick),
         cmocka_unit_test(test_lcm_alone),
         cmocka_unit_test(test_lcm_refuses),

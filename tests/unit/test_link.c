@@ -82,7 +82,8 @@ static int message(unsigned char *p, int direction, long i, int max_len)
 
 static jl_link_config config(int from, int to, jl_u32 session)
 {
-    jl_link_config c = { 8, from, to, session, MAX_LEN, SLOTS, 20000, 2000 };
+    jl_link_config c = { 8, from, to, session, MAX_LEN, SLOTS, 20000, 2000,
+                         0, 0 };
 
     return c;
 }
@@ -179,6 +180,7 @@ static long act(int i)
         assert_in_range(len, JL_FRAME_HEADER + JL_FRAME_TRAILER, JL_FRAME_MAX);
         carry(1 - i, out, len);
     }
+    jl_link_judge(&e->link, w.now);
     sleep = jl_link_timer(&e->link, w.now);
     assert_true(sleep > 0 || sleep == -1);
     if (jl_link_peek(&e->link) != JL_EAGAIN && e->told == 0 &&
@@ -718,6 +720,324 @@ static void test_link_room_at_half(void **state)
     assert_int_equal(jl_link_timer(l, w.now), 20000);
 }
 
+/* What end 1 has to say next: nothing (0), or its ACK, which asks or not. */
+enum { NOTHING, ACKS, ASKS };
+
+static int says(jl_u32 ack)
+{
+    unsigned char out[JL_FRAME_MAX];
+    int len = jl_link_output(&w.e[1].link, out, JL_FRAME_MAX, w.now);
+
+    if (len == 0)
+        return NOTHING;
+    assert_int_equal(out[3], JL_FRAME_ACK);
+    assert_int_equal(jl_get_u32(out + 20), ack);
+    return ACKS + (int)jl_get_u32(out + 16);
+}
+
+static int piece(jl_u32 seq)
+{
+    return forge(JL_FRAME_LAST, 0x1111, 0x2222, seq, 0, 4);
+}
+
+static void test_link_asks_for_the_missing(void **state)
+{
+    jl_link *l = &w.e[1].link;
+    jl_u32 i;
+
+    (void)state;
+    up();
+    assert_int_equal(piece(2), JL_EORDER);
+    assert_int_equal(jl_link_timer(l, w.now), 0);
+    assert_int_equal(says(0), ASKS);
+    for (i = 3; i < 6; i++)             /* once */
+        assert_int_equal(piece(i), JL_EORDER);
+    assert_int_equal(says(0), NOTHING);
+    assert_int_equal(piece(1), JL_EORDER);      /* it starts again, in vain */
+    assert_int_equal(says(0), ASKS);
+    assert_int_equal(piece(2), JL_EORDER);
+    assert_int_equal(says(0), NOTHING);
+    assert_int_equal(piece(2), JL_EORDER);
+    assert_int_equal(says(0), ASKS);
+    assert_int_equal(piece(0), JL_OK);
+    assert_int_equal(says(1), NOTHING);
+    assert_int_equal(piece(5), JL_EORDER);      /* another is missing */
+    assert_int_equal(says(1), ASKS);
+    assert_int_equal(piece(7), JL_EORDER);
+    assert_int_equal(piece(6), JL_EORDER);
+    assert_int_equal(piece(1), JL_OK);          /* it came by itself, but */
+    assert_int_equal(says(2), ASKS);            /* the next was dropped   */
+    assert_int_equal(l->count.early, 10);
+}
+
+static void test_link_does_not_ask_without_room(void **state)
+{
+    jl_link *l = &w.e[1].link;
+    jl_u32 i, window;
+
+    (void)state;
+    up();
+    window = (jl_u32)l->window;
+    for (i = 0; i < window; i++)
+        assert_int_equal(piece(i), JL_OK);
+    assert_int_equal(says(window), ACKS);
+    assert_int_equal(piece(window + 1), JL_EAGAIN);
+    assert_int_equal(says(window), NOTHING);
+    assert_int_equal(jl_link_recv(l, msg, MAX_LEN), 4);
+    assert_int_equal(piece(window + 2), JL_EORDER);
+    assert_int_equal(piece(window + 1), JL_EORDER);
+    assert_int_equal(says(window), NOTHING);
+    assert_int_equal(piece(window), JL_OK);     /* from here on as ever */
+    assert_int_equal(jl_link_recv(l, msg, MAX_LEN), 4);
+    assert_int_equal(piece(window + 3), JL_EORDER);
+    assert_int_equal(says(window + 1), ASKS);
+}
+
+/* The first of six is lost: all six are there before any time has passed. */
+static void test_link_mends_a_loss_at_once(void **state)
+{
+    unsigned char out[JL_FRAME_MAX];
+    jl_link *from = &w.e[0].link, *to = &w.e[1].link;
+    int i, len, lost = 0;
+
+    (void)state;
+    up();
+    for (i = 0; i < 6; i++)
+        assert_int_equal(jl_link_send(from, msg, 1), JL_OK);
+    for (i = 0; i < 3; i++) {
+        while (len = jl_link_output(from, out, JL_FRAME_MAX, w.now), len > 0)
+            if (lost++ > 0)
+                jl_link_input(to, out, len, w.now);
+        while (len = jl_link_output(to, out, JL_FRAME_MAX, w.now), len > 0)
+            jl_link_input(from, out, len, w.now);
+    }
+    for (i = 0; i < 6; i++)
+        assert_int_equal(jl_link_recv(to, msg, MAX_LEN), 1);
+    assert_int_equal(from->count.resent, 6);
+    assert_true(idle());
+}
+
+/* --- beat and silence ---------------------------------------------------- */
+
+/* Both ends up at w.now; end 1 with these times. */
+static void up_with(jl_u32 beat_us, jl_u32 silence_us)
+{
+    up();
+    w.e[1].link.config.beat_us = beat_us;
+    w.e[1].link.config.silence_us = silence_us;
+    forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, 0, 0);
+    w.e[1].link.said_at = w.now;
+}
+
+static void test_link_beats(void **state)
+{
+    unsigned char out[JL_FRAME_MAX];
+    jl_link *l = &w.e[1].link;
+
+    (void)state;
+    up_with(10000, 0);
+    assert_int_equal(jl_link_timer(l, w.now), 10000);
+    w.now += 9999;
+    assert_int_equal(says(0), NOTHING);
+    assert_int_equal(jl_link_timer(l, w.now), 1);
+    w.now += 1;
+    assert_int_equal(says(0), ACKS);
+    assert_int_equal(says(0), NOTHING);
+    w.now += 4000;
+    assert_int_equal(jl_link_timer(l, w.now), 6000);
+    /* data is a word as well, and so is an acknowledgement */
+    assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 37);
+    forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, 1, 0);
+    w.now += 9999;
+    assert_int_equal(says(0), NOTHING);
+    assert_int_equal(piece(0), JL_OK);
+    assert_int_equal(piece(0), JL_EORDER);
+    assert_int_equal(says(1), ACKS);
+    w.now += 9999;
+    assert_int_equal(says(1), NOTHING);
+    w.now += 1;
+    assert_int_equal(says(1), ACKS);
+    /* the other end closes, and may still listen */
+    assert_int_equal(forge(JL_FRAME_BYE, 0x1111, 0x2222, 1, 1, 0), JL_OK);
+    assert_int_equal(says(2), ACKS);
+    w.now += 10000;
+    assert_int_equal(says(2), ACKS);
+    /* we close, and it knows */
+    jl_link_close(l);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 36);
+    assert_int_equal(out[3], JL_FRAME_BYE);
+    assert_int_equal(jl_link_timer(l, w.now), 10000);
+    forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, 2, 0);
+    assert_int_equal(jl_link_timer(l, w.now), -1);
+    w.now += 10000;
+    assert_int_equal(says(2), NOTHING);
+}
+
+/* Listen for us microseconds as a port does; 1 if the link has failed. */
+static int listens_in_vain(jl_u32 us)
+{
+    jl_link *l = &w.e[1].link;
+    jl_u32 end_at = w.now + us;
+
+    while (w.now != end_at) {
+        long step = jl_link_timer(l, w.now);
+
+        if (step == -1)
+            break;
+        assert_true(step > 0);
+        if (step > (long)(end_at - w.now))
+            step = (long)(end_at - w.now);
+        w.now += (jl_u32)step;
+        if (jl_link_judge(l, w.now) != JL_OK)
+            return 1;
+    }
+    return 0;
+}
+
+static void test_link_notices_silence(void **state)
+{
+    unsigned char out[JL_FRAME_MAX];
+    jl_link *l = &w.e[1].link;
+    jl_u32 heard;
+    int i;
+
+    (void)state;
+    for (i = 0; i < 3; i++) {
+        up_with(i == 1 ? 7000 : 0, 80000);
+        w.now = i == 2 ? 0u - 30000u : w.now;   /* the clock wraps */
+        heard = w.now;
+        assert_int_equal(piece(0), JL_OK);
+        assert_int_equal(forge(JL_FRAME_DATA, 0x1111, 0x2222, 1, 0,
+                               JL_FRAME_PAYLOAD), JL_OK);
+        if (i != 1)
+            assert_int_equal(says(2), NOTHING);
+        l->ack_due = 0;
+        assert_int_equal(jl_link_silence(l, w.now), 0);
+        while (i == 1 && w.now - heard < 79000) {   /* also while it beats */
+            jl_link_output(l, out, JL_FRAME_MAX, w.now);
+            assert_false(listens_in_vain(1000));
+        }
+        if (i == 1)
+            l->config.beat_us = 0;
+        else
+            assert_false(listens_in_vain(79000));
+        assert_int_equal(jl_link_silence(l, w.now), 79000);
+        assert_false(listens_in_vain(999));
+        assert_true(listens_in_vain(1));
+        /* it is over, but for what had wholly arrived */
+        assert_int_equal(jl_link_silence(l, w.now), 80000);
+        assert_int_equal(jl_link_judge(l, w.now), JL_ESILENT);
+        assert_int_equal(jl_link_send(l, msg, 1), JL_ESILENT);
+        assert_int_equal(jl_link_recv(l, msg, MAX_LEN), 4);
+        assert_int_equal(jl_link_recv(l, msg, MAX_LEN), JL_ESILENT);
+        assert_int_equal(piece(1), JL_EPEER);
+        assert_int_equal(jl_link_timer(l, w.now), -1);
+        assert_int_equal(says(1), NOTHING);
+        assert_int_equal(jl_link_idle(l), 1);
+    }
+}
+
+/* Whatever proves that the session lives is a word; what does not, is not. */
+static void test_link_hears(void **state)
+{
+    static const struct {
+        int kind;
+        jl_u32 session, peer, seq;
+        int heard;
+    } word[] = {
+        { JL_FRAME_ACK, 0x1111, 0x2222, 0, 1 },
+        { JL_FRAME_LAST, 0x1111, 0x2222, 5, 1 },        /* early */
+        { JL_FRAME_HELLO, 0x1111, 0, 0, 1 },
+        { JL_FRAME_ACK, 0x1111, 0x2223, 0, 0 },
+        { JL_FRAME_ALIVE, 0x1111, 0x2222, 0, 0 },
+        { JL_FRAME_HELLO, 0x3333, 0, 0, 0 },
+        { JL_FRAME_LAST, 0x3333, 0x2222, 0, 0 },
+        { JL_FRAME_DOUBT, 0x3333, 0x2222, 0, 0 }
+    };
+    unsigned char out[JL_FRAME_MAX];
+    unsigned i;
+
+    (void)state;
+    for (i = 0; i < sizeof word / sizeof *word; i++) {
+        up_with(0, 80000);
+        assert_false(listens_in_vain(75000));
+        forge(word[i].kind, word[i].session, word[i].peer, word[i].seq, 0,
+              word[i].kind == JL_FRAME_LAST ? 4 : 0);
+        while (jl_link_output(&w.e[1].link, out, JL_FRAME_MAX, w.now) > 0)
+            ;
+        assert_int_equal(jl_link_silence(&w.e[1].link, w.now),
+                         word[i].heard ? 0 : 75000);
+        assert_int_equal(listens_in_vain(10000), !word[i].heard);
+    }
+}
+
+/* An end that was stopped for long, or comes seldom, has not listened. */
+static void test_link_absence_is_not_silence(void **state)
+{
+    jl_link *l = &w.e[1].link;
+    int i;
+
+    (void)state;
+    up_with(0, 80000);
+    w.now += SECONDS(100);
+    assert_int_equal(jl_link_timer(l, w.now), 0);
+    assert_int_equal(jl_link_judge(l, w.now), JL_OK);
+    assert_int_equal(jl_link_judge(l, w.now), JL_OK);
+    assert_int_equal(jl_link_silence(l, w.now), JL_LINK_MAX_US);
+    assert_false(listens_in_vain(60000));
+    assert_int_equal(piece(0), JL_OK);
+    l->ack_due = 0;
+    assert_int_equal(jl_link_silence(l, w.now), 0);
+    for (i = 0; i < 7; i++) {
+        w.now += SECONDS(i % 2 ? 4220 : 100);   /* the clock goes round */
+        assert_int_equal(jl_link_judge(l, w.now), JL_OK);
+        assert_int_equal(jl_link_silence(l, w.now), JL_LINK_MAX_US);
+    }
+    assert_true(listens_in_vain(10000));
+    /* one that does not ask is never told, and one that closed may be silent */
+    up_with(0, 0);
+    assert_false(listens_in_vain(SECONDS(9)));
+    assert_int_equal(jl_link_timer(l, w.now), -1);
+    up_with(0, 80000);
+    assert_int_equal(forge(JL_FRAME_BYE, 0x1111, 0x2222, 0, 0, 0), JL_OK);
+    assert_int_equal(says(1), ACKS);
+    assert_false(listens_in_vain(SECONDS(9)));
+    assert_int_equal(jl_link_silence(l, w.now), -1);
+    assert_int_equal(jl_link_recv(l, msg, MAX_LEN), JL_ECLOSED);
+    /* one that never came is not silent either */
+    begin(clean, 1);
+    l->config.silence_us = 80000;
+    for (i = 0; i < 20; i++) {
+        w.now += 20000;
+        assert_int_equal(jl_link_judge(l, w.now), JL_OK);
+    }
+    assert_int_equal(jl_link_silence(l, w.now), -1);
+}
+
+/* Half an hour without a message over a bad carrier: no false alarm. */
+static void test_link_beats_keep_it(void **state)
+{
+    int i;
+
+    (void)state;
+    begin(awful, 3);
+    for (i = 0; i < 2; i++) {
+        w.e[i].link.config.beat_us = 50000;
+        w.e[i].link.config.silence_us = 1000000;
+    }
+    goals(10, 10);
+    assert_true(run(all_there, SECONDS(100)));
+    run(NULL, SECONDS(1800));
+    assert_true(both_up());
+    assert_int_equal(w.e[0].told | w.e[1].told, 0);
+    w.c.lose = 100;                     /* the carrier is cut */
+    w.c.twice = 0;
+    run(NULL, SECONDS(2));
+    for (i = 0; i < 2; i++)
+        assert_int_equal(jl_link_recv(&w.e[i].link, msg, MAX_LEN), JL_ESILENT);
+}
+
 static void test_link_before_it_is_up(void **state)
 {
     unsigned char out[JL_FRAME_MAX];
@@ -1044,6 +1364,8 @@ static void test_link_init_refuses(void **state)
     REFUSED(rto_us, 0, JL_EDIM);
     REFUSED(rto_us, JL_LINK_MAX_US + 1, JL_EDIM);
     REFUSED(ack_us, JL_LINK_MAX_US + 1, JL_EDIM);
+    REFUSED(beat_us, JL_LINK_MAX_US + 1, JL_EDIM);
+    REFUSED(silence_us, JL_LINK_MAX_US + 1, JL_EDIM);
     REFUSED(slots, SLOTS + 1, JL_ENOMEM);
     assert_int_equal(jl_link_init(&l, &good, w.e[0].mem, MEM - 1, 0),
                      JL_ENOMEM);
@@ -1056,6 +1378,7 @@ static void test_link_init_refuses(void **state)
     good.max_len = 0;
     good.slots = 1;
     good.rto_us = good.ack_us = JL_LINK_MAX_US;
+    good.beat_us = good.silence_us = JL_LINK_MAX_US;
     assert_int_equal(jl_link_init(&l, &good, w.e[0].mem, JL_LINK_MEM(0, 1), 0),
                      JL_OK);
 }
@@ -1114,6 +1437,14 @@ int main(void)
         cmocka_unit_test(test_link_hello_to_an_up_link),
         cmocka_unit_test(test_link_hello_repeats),
         cmocka_unit_test(test_link_room_at_half),
+        cmocka_unit_test(test_link_asks_for_the_missing),
+        cmocka_unit_test(test_link_does_not_ask_without_room),
+        cmocka_unit_test(test_link_mends_a_loss_at_once),
+        cmocka_unit_test(test_link_beats),
+        cmocka_unit_test(test_link_notices_silence),
+        cmocka_unit_test(test_link_hears),
+        cmocka_unit_test(test_link_absence_is_not_silence),
+        cmocka_unit_test(test_link_beats_keep_it),
         cmocka_unit_test(test_link_before_it_is_up),
         cmocka_unit_test(test_link_refuses_foreign),
         cmocka_unit_test(test_link_hostile_peer),
