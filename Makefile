@@ -7,6 +7,7 @@
 #   make test       every test, with double and with float
 #   make check      standards, layers, symbols, cross-builds
 #   make sanitize   every test under AddressSanitizer and UBSan
+#   make bench      what messages and steps cost: tables, CSV, plots
 #   make tsan       the tests of PEs on threads, under ThreadSanitizer
 #   make deps       install the packages that sim and test need
 #   make install    libraries, headers, program to $(DESTDIR)$(PREFIX)
@@ -40,7 +41,7 @@ SIM_SRC := $(wildcard sim/*.c)
 LIBS := -Wl,--as-needed -llcm -ljansson -lm
 
 .PHONY: all lib deps sim test golden run-tests check sanitize tsan run-tsan \
-    install clean force
+    bench run-bench     install clean force
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -154,6 +155,23 @@ run-tests: $(TESTS) $(PROGRAMS) lib
 # No fork: what ThreadSanitizer watches are threads.
 run-tsan: $(foreach t,conform_loop conform_threads par_loop par_threads,$(BUILD)/tests/test_$(t) $(BUILD)/tests_f32/test_$(t))
 	@sh tests/check/run_tests.sh $^
+
+# --- figures -------------------------------------------------------------
+
+# tests/bench/bench_x.c with a main becomes $(BUILD)/bench/bench_x.
+BENCHES := $(patsubst %,$(BUILD)/bench/bench_%,channels step break_even)
+$(BENCHES): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o \
+    $(patsubst %,$(BUILD)/obj/tests/bench/bench_%.o,samples nodes filter) \
+    $(BUILD)/libsim.a $(BUILD)/libports.a $(BUILD)/libjumplink.a
+	@mkdir -p $(@D); echo '  $@'; $(CC) $(CFLAGS) -pthread $^ $(LIBS) -o $@
+
+bench: deps
+	$(AGAIN) run-bench
+
+run-bench: $(BENCHES)
+	@for b in $(BENCHES); do $$b $(BUILD)/bench || exit 1; done
+	@cd $(BUILD)/bench && gnuplot '$(CURDIR)/tests/bench/latency.gp' '$(CURDIR)/tests/bench/break_even.gp'
+	@echo 'CSV and plots: $(BUILD)/bench'
 
 # --- the rest ------------------------------------------------------------
 
