@@ -7,6 +7,7 @@
 #   make test       every test, with double and with float
 #   make check      standards, layers, symbols, cross-builds
 #   make sanitize   every test under AddressSanitizer and UBSan
+#   make bench      what messages and steps cost: tables, CSV, plots
 #   make tsan       the tests of PEs on threads, under ThreadSanitizer
 #   make fuzz       libFuzzer over the decoders, SECONDS=60 for each
 #   make deps       install the packages that sim and test need
@@ -44,7 +45,7 @@ GEN_SRC := $(patsubst sim/lcm/%.lcm,$(BUILD)/gen/jumplink_%.c,$(wildcard sim/lcm
 LIBS := -Wl,--as-needed -llcm -ljansson -lm
 
 .PHONY: all lib deps sim test generated golden run-tests check sanitize tsan \
-    run-tsan fuzz install clean force
+    run-tsan fuzz bench run-bench install clean force
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -199,6 +200,23 @@ $(BUILD)/fuzz/%: tests/fuzz/fuzz_%.c $(FUZZ_SRC) $(wildcard include/*/*.h src/*/
 	    clang $(FUZZING) -Dfuzz_$*=LLVMFuzzerTestOneInput $(filter %.c,$^) -lm -o $@
 $(BUILD)/gen_seeds: tests/fuzz/gen_seeds.c tests/fuzz/fuzz.c $(BUILD)/libjumplink.a
 	@echo '  $@'; $(CC) $(HOST) $(CFLAGS) $^ -o $@
+
+# --- figures -------------------------------------------------------------
+
+# tests/bench/bench_x.c with a main becomes $(BUILD)/bench/bench_x.
+BENCHES := $(patsubst %,$(BUILD)/bench/bench_%,channels step break_even)
+$(BENCHES): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o \
+    $(patsubst %,$(BUILD)/obj/tests/bench/bench_%.o,samples nodes filter) \
+    $(BUILD)/libsim.a $(BUILD)/libports.a $(BUILD)/libjumplink.a
+	@mkdir -p $(@D); echo '  $@'; $(CC) $(CFLAGS) -pthread $^ $(LIBS) -o $@
+
+bench: deps
+	$(AGAIN) run-bench
+
+run-bench: $(BENCHES)
+	@for b in $(BENCHES); do $$b $(BUILD)/bench || exit 1; done
+	@cd $(BUILD)/bench && gnuplot '$(CURDIR)/tests/bench/latency.gp' '$(CURDIR)/tests/bench/break_even.gp'
+	@echo 'CSV and plots: $(BUILD)/bench'
 
 # --- the rest ------------------------------------------------------------
 

@@ -19,8 +19,9 @@ struct job {
 
 /* --- either port --------------------------------------------------------- */
 
-static int open_port(struct job *job, int nodes, int max_len)
+static int open_port(struct job *job)
 {
+    int nodes = job->options->pes + 1, max_len = run_max_len(job->model);
     int slots = run_slots(job->options);
 
     if (job->options->port == PORT_LOOP)
@@ -103,7 +104,7 @@ int run_inside(struct estimates *e, struct traffic *traffic,
     struct job job = { NULL, NULL, e, model, data, options, 1 };
     int status;
 
-    if (!open_port(&job, options->pes + 1, run_max_len(model))) {
+    if (!open_port(&job)) {
         complain(port, 0, NULL, "no memory for %d PEs", options->pes);
         return 1;
     }
