@@ -32,7 +32,7 @@ struct end {
     struct life lives[LIVES];
     int life;                   /* the present one                          */
     int got;                    /* messages, in this life                   */
-    jl_u32 heard_at;            /* took something at this time              */
+    jl_u32 unheard_us;          /* since it took something; does not wrap   */
 };
 
 struct datagram {
@@ -102,6 +102,7 @@ static void begin_life(struct world *w, int i)
     FUZZ_HOLDS(jl_link_init(&e->link, &config, e->mem, octets, w->now) ==
                JL_OK);
     e->got = 0;
+    e->unheard_us = 0;
 }
 
 /* --- bookkeeping --------------------------------------------------------- */
@@ -109,6 +110,17 @@ static void begin_life(struct world *w, int i)
 static jl_u32 apart(jl_u32 a, jl_u32 b)
 {
     return (a - b) & (jl_u32)0xffffffffUL;
+}
+
+static void pass_time(struct world *w, jl_u32 us)
+{
+    int i;
+
+    w->now += us;
+    for (i = 0; i < 2; i++)
+        if (w->end[i].unheard_us < (jl_u32)JL_LINK_MAX_US)
+            w->end[i].unheard_us += us > (jl_u32)JL_LINK_MAX_US
+                ? (jl_u32)JL_LINK_MAX_US : us;
 }
 
 static void check_sound(const struct world *w, const struct end *e)
@@ -236,7 +248,7 @@ static void do_judge(struct world *w, int i)
     FUZZ_HOLDS(status == (l->failed == JL_ESILENT ? JL_ESILENT : JL_OK));
     if (l->failed != failed) {
         FUZZ_HOLDS(failed == JL_OK && status == JL_ESILENT);
-        FUZZ_HOLDS(apart(w->now, w->end[i].heard_at) >= w->silence_us);
+        FUZZ_HOLDS(w->end[i].unheard_us >= w->silence_us);
     }
 }
 
@@ -266,7 +278,7 @@ static int do_input(struct world *w, int i, const unsigned char *octets,
     if (status <= JL_EMAGIC && status >= JL_ECRC)
         FUZZ_HOLDS(b.refused == a.refused + 1);
     if (b.received > a.received)
-        w->end[i].heard_at = w->now;
+        w->end[i].unheard_us = 0;
     return status;
 }
 
@@ -287,7 +299,7 @@ static int do_output(struct world *w, int i, unsigned char *octets)
         FUZZ_HOLDS(frame.session == l->config.session);
         memcpy(octets, out, (size_t)len);
     } else {
-        FUZZ_HOLDS(jl_link_timer(l, w->now) != 0);
+        FUZZ_HOLDS(w->silence_us > 0 || jl_link_timer(l, w->now) != 0);
     }
     free(out);
     return len;
@@ -438,7 +450,7 @@ static void operate(struct world *w)
     case 1: do_send(w, i, some_len(w)); break;
     case 2: (void)do_recv(w, i, w->max_len); break;
     case 3: (void)do_recv(w, i, some_len(w)); break;
-    case 4: w->now += some_time(w); break;
+    case 4: pass_time(w, some_time(w)); break;
     case 5: do_make_up(w, i); break;
     case 6: do_noise(w, i); break;
     case 7:
@@ -511,12 +523,12 @@ static void check_arrival(struct world *w)
 {
     unsigned char octets[JL_FRAME_MAX];
     int restarted = w->end[0].life + w->end[1].life > 0;
+    long timer, next = 0;
     int i, len, rounds;
 
-    for (rounds = 0; !over(w) && !(quiet(w, 0) && quiet(w, 1)); rounds++) {
-        long timer, next = -1;
-
+    for (rounds = 0; next >= 0; rounds++) {
         FUZZ_HOLDS(rounds < 3000);
+        pass_time(w, (jl_u32)next);
         for (i = 0; i < 2; i++)
             while (do_recv(w, i, w->max_len))
                 ;
@@ -525,13 +537,17 @@ static void check_arrival(struct world *w)
                 (void)do_input(w, 1 - i, octets, len);
         for (i = 0; i < 2; i++)
             do_judge(w, i);
+        if (over(w) || (quiet(w, 0) && quiet(w, 1)))
+            break;
+        next = -1;
         for (i = 0; i < 2; i++) {
             timer = jl_link_timer(&w->end[i].link, w->now);
             if (timer >= 0 && (next < 0 || timer < next))
                 next = timer;
         }
-        if (next > 0)
-            w->now += (jl_u32)next;
+        if (next < 0 && (jl_link_peek(&w->end[0].link) >= 0 ||
+                         jl_link_peek(&w->end[1].link) >= 0))
+            next = 0;
     }
     FUZZ_HOLDS(restarted || w->silence_us > 0 || !over(w));
     for (i = 0; i < 2 && !over(w); i++) {

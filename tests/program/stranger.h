@@ -284,8 +284,8 @@ static inline void stranger_act(struct stranger *s)
     }
 }
 
-/* Be hostile to the first `nodes` nodes of a run; returns when the first words are said,
- * and goes on until stranger_end. */
+/* Be hostile to the first `nodes` nodes of a run; returns when the first words
+ * are said, and goes on until stranger_end. */
 static inline pid_t stranger_start(const char *run, int nodes)
 {
     static struct stranger s;
@@ -344,20 +344,15 @@ static inline pid_t stranger_record(const char *path)
     return child;
 }
 
-/* Send a record again and again, without its timing; its first round begins
- * before this returns. */
-static inline pid_t stranger_replay(const char *path)
+static inline void stranger_repeat(int fd, int mouth, const char *path)
 {
     static unsigned char octets[STRANGER_LONGEST];
-    int mouth = socket(AF_INET, SOCK_DGRAM, 0), fd = open(path, O_RDONLY), i;
-    pid_t child;
+    ssize_t n;
+    int i;
 
-    scratch_must(mouth >= 0 && fd >= 0, path);
-    child = stranger_begin();
-    for (i = 0; child == 0; i++) {
+    for (i = 0;; i++) {
         if (read(fd, octets, 4) == 4) {
-            ssize_t n = (ssize_t)jl_get_u32(octets);
-
+            n = (ssize_t)jl_get_u32(octets);
             scratch_must(n <= STRANGER_LONGEST
                          && read(fd, octets, (size_t)n) == n, path);
             stranger_send(mouth, octets, (size_t)n);
@@ -367,6 +362,18 @@ static inline pid_t stranger_replay(const char *path)
         if (i % 8 == 7)
             poll(NULL, 0, 1);
     }
+}
+
+/* Send a record again and again, without its timing. */
+static inline pid_t stranger_replay(const char *path)
+{
+    int mouth = socket(AF_INET, SOCK_DGRAM, 0), fd = open(path, O_RDONLY);
+    pid_t child;
+
+    scratch_must(mouth >= 0 && fd >= 0, path);
+    child = stranger_begin();
+    if (child == 0)
+        stranger_repeat(fd, mouth, path);
     close(mouth);
     close(fd);
     return child;
