@@ -25,7 +25,7 @@ static int serve(int pe, const struct model *model,
                  const struct options *options)
 {
     struct lcm_node node;
-    struct traffic traffic = { 0, 0, 0 };
+    struct traffic traffic = { 0 };
     int status;
 
     if (lcm_node_open(&node, pe, options->lcm_url, options->run, model,
@@ -38,8 +38,9 @@ static int serve(int pe, const struct model *model,
     lcm_node_close(&node, status == JL_OK);
     if (status != JL_OK)
         return 1;
-    printf("pe %d of %d: %lu messages, %lu octets, %lu sent again\n", pe,
-           options->pes, traffic.messages, traffic.octets, traffic.resent);
+    printf("pe %d of %d: %lu messages, %lu octets, %lu sent again, %lu "
+           "refused\n", pe, options->pes, traffic.messages, traffic.octets,
+           traffic.resent, traffic.refused);
     return 0;
 }
 

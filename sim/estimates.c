@@ -8,39 +8,58 @@
 #include "complain.h"
 #include "out_file.h"
 
-/* All NaNs have the same bits, so that files and comparisons agree. */
-static jl_real *nans(long count)
+/* From count to more numbers, the new ones NaN.  All NaNs have the same bits,
+ * so that files and comparisons agree. */
+static int stretch(jl_real **v, long count, long more)
 {
-    jl_real *v = malloc((size_t)count * sizeof *v);
-    long i;
+    jl_real *larger = reallocarray(*v, (size_t)more, sizeof *larger);
 
-    for (i = 0; v != NULL && i < count; i++)
-        v[i] = (jl_real)NAN;
-    return v;
+    if (larger == NULL)
+        return -1;
+    for (*v = larger; count < more; count++)
+        larger[count] = (jl_real)NAN;
+    return 0;
+}
+
+static int make_room(struct estimates *e, long rows)
+{
+    long had = e->room, n = e->n, M = e->M;
+    double *us;
+
+    if (stretch(&e->x, had * n, rows * n) != 0
+        || stretch(&e->P, had * n * n, rows * n * n) != 0
+        || stretch(&e->mu, had * M, rows * M) != 0
+        || stretch(&e->loglik, had, rows) != 0)
+        return -1;
+    us = reallocarray(e->us, (size_t)rows, sizeof *us);
+    if (us == NULL)
+        return -1;
+    for (e->us = us; had < rows; had++)
+        us[had] = (double)NAN;
+    e->room = rows;
+    return 0;
+}
+
+int estimates_grow(struct estimates *e, long rows)
+{
+    if (rows > e->room && make_room(e, rows > 2 * e->room ? rows
+                                                          : 2 * e->room) != 0)
+        return -1;
+    if (rows > e->rows)
+        e->rows = rows;
+    return 0;
 }
 
 int estimates_open(struct estimates *e, const struct data_file *data,
                    const struct model *model)
 {
-    long i;
-
     memset(e, 0, sizeof *e);
-    e->rows = data->rows;
     e->n = model->n;
     e->M = model->M;
-    e->x = nans(e->rows * e->n);
-    e->P = nans(e->rows * e->n * e->n);
-    e->mu = nans(e->rows * e->M);
-    e->loglik = nans(e->rows);
-    e->us = malloc((size_t)e->rows * sizeof *e->us);
-    if (e->x == NULL || e->P == NULL || e->mu == NULL || e->loglik == NULL
-        || e->us == NULL) {
-        estimates_close(e);
-        return complain(data->path, 0, NULL, "no memory for its estimates");
-    }
-    for (i = 0; i < e->rows; i++)
-        e->us[i] = (double)NAN;
-    return 0;
+    if (estimates_grow(e, data->rows) == 0)
+        return 0;
+    estimates_close(e);
+    return complain(data->path, 0, NULL, "no memory for its estimates");
 }
 
 void estimates_close(struct estimates *e)
@@ -81,6 +100,26 @@ int estimates_same(const struct estimates *a, const struct estimates *b)
         && same(a->P, b->P, rows * a->n * a->n)
         && same(a->mu, b->mu, rows * a->M)
         && same(a->loglik, b->loglik, rows);
+}
+
+double estimates_apart(const struct estimates *a, const struct estimates *b)
+{
+    double most = 0;
+    long row;
+    int i, n = b->n;
+
+    for (row = 0; row < b->rows; row++)
+        for (i = 0; i < n; i++) {
+            double x = (double)a->x[row * n + i], y = (double)b->x[row * n + i];
+            double apart = fabs(x - y)
+                / sqrt((double)b->P[(row * n + i) * n + i]);
+
+            if (isnan(x) != isnan(y))
+                return (double)NAN;
+            if (apart > most)
+                most = apart;
+        }
+    return most;
 }
 
 static int ascending(const void *a, const void *b)

@@ -83,6 +83,7 @@ int lcm_node_open(struct lcm_node *node, int which, const char *url,
 
 void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic)
 {
+    jl_link_count count = jl_lcm_count(node->lcm);
     int i;
 
     for (i = 0; i < node->nodes; i++)
@@ -90,7 +91,15 @@ void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic)
             traffic->messages += node->to[i]->messages;
             traffic->octets += node->to[i]->octets;
         }
-    traffic->resent += jl_lcm_count(node->lcm).resent;
+    traffic->resent += count.resent;
+    traffic->refused += count.refused + count.stale;
+}
+
+void lcm_say_refused(const struct traffic *traffic)
+{
+    if (traffic->refused > 0)
+        complain("LCM", 0, NULL, "%lu datagrams that do not belong to this "
+                 "run were refused", traffic->refused);
 }
 
 int lcm_node_silent(const struct lcm_node *node,

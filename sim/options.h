@@ -16,6 +16,8 @@ enum hold {                     /* which rows count as arrived */
 /* BY_HAND: over LCM, with PEs that somebody else starts. */
 enum port { PORT_NONE, PORT_LOOP, PORT_THREADS, PORT_LCM, PORT_BY_HAND };
 
+struct live_input;
+
 struct options {
     const char *command;        /* for messages: "filter"                   */
     int kf;                     /* 0: imm, 1: kf of one mode                */
@@ -30,6 +32,7 @@ struct options {
     long start_us;              /* for all to be there at its start         */
     const char *lcm_url;        /* NULL: a private network                  */
     const char *run;            /* name of an LCM run, or NULL              */
+    struct live_input *live;    /* rows come from there, one by one; or NULL */
     const char *z, *time;       /* columns of the data                      */
     const char *out;            /* -o or --out                              */
 };

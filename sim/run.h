@@ -12,6 +12,7 @@ struct traffic {
     unsigned long messages;
     unsigned long octets;
     unsigned long resent;       /* datagrams sent again                     */
+    unsigned long refused;      /* datagrams of strangers, dropped          */
 };
 
 /* Each runs the filter over all rows of the record into *e.  On failure prints

@@ -10,7 +10,9 @@
 #include "complain.h"
 #include "interrupt.h"
 #include "jumplink/par.h"
+#include "live_input.h"
 #include "progress.h"
+#include "typed.h"
 
 int run_is_channels(int status)
 {
@@ -99,29 +101,78 @@ static long answer_us(const struct options *options)
         + 1000000;
 }
 
+/* The longest look at the network for a measurement, and then the links. */
+#define LOOK_US 20000L
+
+/* Nothing is on its way while the host waits for a measurement, so what comes
+ * is the end of the run; and the links go on only in a call. */
+static int keep_going(struct run_host *host, const struct model *model,
+                      jl_estimate *estimate, unsigned char *buf, int cap)
+{
+    int status = jl_host_recv(host->from, estimate, model->M, model->n, buf,
+                              cap, 0);
+
+    host->failed_pe = estimate->failed_pe;
+    if (status == JL_OK)
+        return JL_EMSG;
+    if (status == JL_ETIMEOUT && host->alive != NULL
+        && !host->alive(host->context))
+        return JL_ECLOSED;
+    return status == JL_ETIMEOUT ? JL_OK : status;
+}
+
+/* JL_OK: the record has the row; LIVE_END: it is over; or why it cannot. */
+static int next_row(struct estimates *e, long row, struct run_host *host,
+                    const struct model *model, const struct data_file *data,
+                    struct live_input *live, jl_estimate *estimate,
+                    unsigned char *buf, int cap)
+{
+    int status;
+
+    if (live == NULL)
+        return row < data->rows ? JL_OK : LIVE_END;
+    while ((status = live_row(live, row, LOOK_US)) == JL_ETIMEOUT) {
+        status = keep_going(host, model, estimate, buf, cap);
+        if (status != JL_OK)
+            return status;
+    }
+    if (status == JL_OK && estimates_grow(e, row + 1) != 0)
+        status = JL_ENOMEM;
+    return status;
+}
+
 static int host_rows(struct estimates *e, long *row,
                      struct run_host *host, const struct model *model,
                      const struct data_file *data,
                      const struct options *options, jl_estimate *estimate,
-                     unsigned char *buf, int cap)
+                     unsigned char *buf, int cap, struct typed *typed)
 {
     struct feed feed;
     jl_meas meas;
-    int status = JL_OK;
+    int fed, status;
 
     if (feed_open(&feed, data, model, options) != 0)
         return JL_EDIM;
-    for (*row = 0; *row < data->rows; ++*row) {
-        if (feed_meas(&feed, *row, &meas))
+    for (*row = 0; ; ++*row) {
+        status = next_row(e, *row, host, model, data, options->live, estimate,
+                          buf, cap);
+        if (status != JL_OK)
+            break;
+        fed = feed_meas(&feed, *row, &meas);
+        typed_measurement(typed, *row, fed ? meas.z : NULL);
+        if (fed)
             status = host_row(e, *row, host, &meas, estimate, model, buf, cap,
                               answer_us(options));
-        if (status == JL_OK && interrupted() != NULL)
+        if (fed && (status == JL_OK || !run_is_channels(status)))
+            typed_estimate(typed, *row, estimate);
+        if (status == JL_OK && options->live == NULL && interrupted() != NULL)
             status = RUN_INTERRUPTED;
         if (status != JL_OK)
             return status;
         progress(*row + 1, data->rows);
     }
-    return JL_OK;
+    --*row;                             /* the last that was there */
+    return status == LIVE_END ? JL_OK : status;
 }
 
 int run_host(struct estimates *e, long *row, struct run_host *host,
@@ -132,6 +183,7 @@ int run_host(struct estimates *e, long *row, struct run_host *host,
     unsigned char *buf = malloc((size_t)cap);
     jl_real *mem = calloc((size_t)(n + n * n + model->M), sizeof *mem);
     jl_estimate estimate;
+    struct typed typed;
 
     *row = -1;
     host->failed_pe = -1;
@@ -146,9 +198,12 @@ int run_host(struct estimates *e, long *row, struct run_host *host,
     estimate.mu = estimate.P + n * n;
     status = receive(host, NULL, run_fingerprint(model, options), model, buf,
                      cap, options->start_us + 1000000);
-    if (status == JL_OK)
+    if (status == JL_OK) {
+        typed_open(&typed, model, data, options);
         status = host_rows(e, row, host, model, data, options, &estimate, buf,
-                           cap);
+                           cap, &typed);
+        typed_close(&typed);
+    }
     if (status == JL_OK || !run_is_channels(status))
         (void)jl_host_stop(host->to, buf, cap, options->timeout_us);
     free(buf);

@@ -85,6 +85,7 @@ static void become_pe(int pe, const char *url, const char *run,
         }
     }
     argv[n] = NULL;
+    close_range(3, ~0u, 0);             /* LCM's sockets are not for it */
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     signal(SIGINT, SIG_IGN);            /* of the terminal: the host ends */
     signal(SIGHUP, SIG_IGN);            /* the run, and so does a PE      */
@@ -151,17 +152,19 @@ static int take_words(struct crew *crew, struct pe *pe,
                       struct traffic *traffic)
 {
     static const char complains[] = "jumplink: ";
-    unsigned long messages, octets, resent;
+    unsigned long messages, octets, resent, refused;
     char line[200], *keep;
     int left = 0;
 
     while (fgets(line, sizeof line, pe->words) != NULL) {
         line[strcspn(line, "\n")] = '\0';
         if (sscanf(line, "pe %*d of %*d: %lu messages, %lu octets, "
-                   "%lu sent again", &messages, &octets, &resent) == 3) {
+                   "%lu sent again, %lu refused", &messages, &octets, &resent,
+                   &refused) == 4) {
             traffic->messages += messages;
             traffic->octets += octets;
             traffic->resent += resent;
+            traffic->refused += refused;
             left = 1;
         } else if (strncmp(line, complains, sizeof complains - 1) == 0) {
             keep = strstr(line, ": no word from ") != NULL
@@ -260,8 +263,10 @@ int run_lcm(struct estimates *e, struct traffic *traffic,
     lcm_node_traffic(&node, traffic);
     lcm_node_close(&node, status == JL_OK);
     bad = dismiss(&crew, traffic, status == JL_OK ? LEAVE_US : FAIL_US);
-    if (status == JL_OK && !bad)
+    if (status == JL_OK && !bad) {
+        lcm_say_refused(traffic);
         return 0;
+    }
     if (run_is_channels(status) || status == JL_OK)
         say_why(&crew, data, row, status, &host);
     else
@@ -290,6 +295,8 @@ int run_by_hand(struct estimates *e, struct traffic *traffic,
             host.failed_pe = lcm_node_silent(&node, options);
         (void)run_failed(data, row, status, host.failed_pe);
         lcm_node_hint(&node);
+    } else {
+        lcm_say_refused(traffic);
     }
     lcm_node_close(&node, status == JL_OK);
     return status == JL_OK ? 0 : 1;

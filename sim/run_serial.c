@@ -40,7 +40,7 @@ int run_serial(struct estimates *e, const struct model *model,
                                            : (double)NAN);
         if (status == JL_STARTED)
             status = JL_OK;
-        if (status == JL_OK && interrupted() != NULL)
+        if (status == JL_OK && options->live == NULL && interrupted() != NULL)
             status = RUN_INTERRUPTED;
         progress(row + 1, data->rows);
     }

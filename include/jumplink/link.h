@@ -21,7 +21,7 @@
  * Sessions.  Each end has a session number, new for every start of the
  * program.  HELLO frames tell it to the other end, and the link is up only
  * when a frame has shown that the other end knows ours: a recorded frame, or
- * one of an earlier life of the other end, never can.  When an end that is up
+ * one of a life of the other end that was over before ours began, never can.  When an end that is up
  * hears of another session of the other end, it asks that session (DOUBT).
  * Only a living other end answers (ALIVE); then it has restarted, and the link
  * fails with JL_EPEER: what was under way cannot be known to have arrived.
@@ -101,6 +101,7 @@ typedef struct jl_link {
     jl_u32 out_end;             /* behind the last piece handed to us       */
     jl_u32 sent_at;             /* when a piece or HELLO last went out      */
     jl_u32 wait_us;             /* how long from then until sent again      */
+    int heeded;                 /* times the other end asked for out_first  */
     unsigned char *in;          /* ring of pieces not fetched by recv       */
     int in_slot;                /* where in the ring the oldest lies        */
     int in_held;                /* pieces in the ring                       */

@@ -8,7 +8,8 @@
 
 #include "jumplink.h"
 
-#define PAR_M 9                         /* modes at most */
+#define PAR_M 9                         /* modes, usually */
+#define PAR_MOST 16                     /* ... and at most */
 #define PAR_N 4
 #define PAR_Z 2
 #define PAR_STEPS 60
@@ -28,12 +29,12 @@ struct par_shape {
 
 /* Every PE builds its own. */
 struct par_bank {
-    jl_mode modes[PAR_M];
-    jl_real mode_mem[PAR_M][JL_MODE_MEM(PAR_N, PAR_Z, PAR_Z)];
-    jl_real mem[JL_IMM_STATE(PAR_M, PAR_N)];
-    jl_real scratch[JL_IMM_SCRATCH(PAR_M, PAR_N, PAR_Z)];
-    jl_real Pi[PAR_M * PAR_M];
-    jl_motion motions[PAR_M];
+    jl_mode modes[PAR_MOST];
+    jl_real mode_mem[PAR_MOST][JL_MODE_MEM(PAR_N, PAR_Z, PAR_Z)];
+    jl_real mem[JL_IMM_STATE(PAR_MOST, PAR_N)];
+    jl_real scratch[JL_IMM_SCRATCH(PAR_MOST, PAR_N, PAR_Z)];
+    jl_real Pi[PAR_MOST * PAR_MOST];
+    jl_motion motions[PAR_MOST];
     jl_imm imm;
     jl_chan *silent;            /* nothing ever comes here                  */
     int hangs_at;               /* or -1                                    */
@@ -44,7 +45,7 @@ struct par_trace {
     int status[PAR_STEPS];
     jl_real x[PAR_STEPS][PAR_N];
     jl_real P[PAR_STEPS][PAR_N * PAR_N];
-    jl_real mu[PAR_STEPS][PAR_M];
+    jl_real mu[PAR_STEPS][PAR_MOST];
     jl_real loglik[PAR_STEPS];
 };
 
@@ -53,7 +54,7 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
                                  const jl_kf_form *form)
 {
     static const jl_real x0[PAR_N] = { 0, 150, 0, 40 };
-    jl_real x[PAR_M * PAR_N], mu[PAR_M], P[PAR_M * PAR_N * PAR_N];
+    jl_real x[PAR_MOST * PAR_N], mu[PAR_MOST], P[PAR_MOST * PAR_N * PAR_N];
     int i, j;
 
     memset(P, 0, sizeof P);
@@ -82,7 +83,7 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
     }
     assert_int_equal(jl_imm_init(&bank->imm, M, bank->modes, form,
                                  JL_MIX_AUTO, bank->mem,
-                                 JL_IMM_STATE(PAR_M, PAR_N)), 0);
+                                 JL_IMM_STATE(PAR_MOST, PAR_N)), 0);
     assert_int_equal(jl_imm_chain(&bank->imm, bank->Pi), 0);
     assert_int_equal(bank->imm.sticky, sticky || M <= 2);
     assert_int_equal(jl_imm_set(&bank->imm, x, P, mu, bank->scratch), 0);
@@ -170,8 +171,8 @@ static inline int par_pe(int pe, const struct par_shape *shape, jl_chan **to,
                          jl_chan **from, int *blamed)
 {
     struct par_bank *bank = malloc(sizeof *bank);
-    unsigned char owner[PAR_M], buf[JL_PAR_BUF(PAR_M, PAR_N, PAR_Z)];
-    int mode_status[PAR_M], status;
+    unsigned char owner[PAR_MOST], buf[JL_PAR_BUF(PAR_MOST, PAR_N, PAR_Z)];
+    int mode_status[PAR_MOST], status;
     jl_par_config config = { 0 };
     jl_real z[PAR_Z];
     jl_par par;
@@ -212,8 +213,8 @@ static inline int par_host(struct par_trace *trace,
                            const struct par_shape *shape, jl_chan *to,
                            jl_chan *from, int *blamed)
 {
-    unsigned char buf[JL_PAR_MSG(PAR_M, PAR_N, PAR_Z)];
-    jl_real x[PAR_N], P[PAR_N * PAR_N], mu[PAR_M], z[PAR_Z];
+    unsigned char buf[JL_PAR_MSG(PAR_MOST, PAR_N, PAR_Z)];
+    jl_real x[PAR_N], P[PAR_N * PAR_N], mu[PAR_MOST], z[PAR_Z];
     jl_estimate estimate = { 0 };
     jl_meas meas;
     int k, status;

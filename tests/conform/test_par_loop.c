@@ -40,7 +40,7 @@ static void start(struct run *run, int slots)
 {
     /* the last node does nothing but never send, for a PE to sleep on */
     run->loop = jl_loop_new(run->shape.npe + 2,
-                            JL_PAR_MSG(PAR_M, PAR_N, PAR_Z), slots);
+                            JL_PAR_MSG(PAR_MOST, PAR_N, PAR_Z), slots);
     assert_non_null(run->loop);
     assert_int_equal(jl_loop_run(run->loop, body, run), JL_OK);
     jl_loop_free(run->loop);
@@ -97,6 +97,23 @@ static void test_par_gives_serial_bits_for_any_pes_and_topology(void **state)
             compare_all(&run);
 }
 
+static void test_par_gives_serial_bits_on_sixteen_pes(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1 } };
+    struct par_shape *s = &run.shape;
+    int slots;
+
+    (void)state;
+    s->form = &jl_kf_joseph;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->M = 15; s->M <= PAR_MOST; s->M++)
+            for (slots = 0; slots <= 2; slots++) {
+                s->npe = s->M;
+                compare(&run, slots);
+            }
+}
+
 static void test_par_leaves_spare_pes_idle(void **state)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
@@ -140,7 +157,7 @@ static void assert_close_trace(const struct par_trace *a,
                              within * sigma
                              * sqrt((double)b->P[k][j * PAR_N + j]));
         }
-        for (j = 0; j < PAR_M; j++)
+        for (j = 0; j < PAR_MOST; j++)
             assert_close(a->mu[k][j], b->mu[k][j], within);
         assert_close(a->loglik[k], b->loglik[k],
                      within * (1 + fabs((double)b->loglik[k])));
@@ -403,6 +420,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_for_any_pes_and_topology),
+        cmocka_unit_test(test_par_gives_serial_bits_on_sixteen_pes),
         cmocka_unit_test(test_par_leaves_spare_pes_idle),
         cmocka_unit_test(test_par_reduce_equals_serial_up_to_rounding),
         cmocka_unit_test(test_par_reduce_refuses_a_chain_that_is_not_sticky),
