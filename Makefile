@@ -7,9 +7,9 @@
 #   make test       every test, with double and with float
 #   make check      standards, layers, symbols, cross-builds
 #   make sanitize   every test under AddressSanitizer and UBSan
-#   make bench      what messages and steps cost: tables, CSV, plots
 #   make tsan       the tests of PEs on threads, under ThreadSanitizer
 #   make fuzz       libFuzzer over the decoders, SECONDS=60 for each
+#   make bench      what messages and steps cost: tables, CSV, plots
 #   make deps       install the packages that sim and test need
 #   make install    libraries, headers, program to $(DESTDIR)$(PREFIX)
 #   make clean

@@ -72,15 +72,15 @@ const char *options_port_name(enum port port)
 static int choose(const char *command, const char *option, const char *value,
                   const char *const *names)
 {
-    char known[100];
+    char known[100] = "";
     int i, used = 0;
 
-    for (i = 0; names[i] != NULL; i++)
+    for (i = 0; names[i] != NULL; i++) {
         if (strcmp(value, names[i]) == 0)
             return i;
-    for (i = 0; names[i] != NULL; i++)
         used += snprintf(known + used, sizeof known - (size_t)used, "%s%s",
                          i > 0 ? ", " : "", names[i]);
+    }
     (void)misuse(command, "--%s %s: unknown; known are %s", option, value,
                  known);
     return -1;

@@ -19,9 +19,8 @@ struct job {
 
 /* --- either port --------------------------------------------------------- */
 
-static int open_port(struct job *job)
+static int open_port(struct job *job, int nodes, int max_len)
 {
-    int nodes = job->options->pes + 1, max_len = run_max_len(job->model);
     int slots = run_slots(job->options);
 
     if (job->options->port == PORT_LOOP)
@@ -104,7 +103,7 @@ int run_inside(struct estimates *e, struct traffic *traffic,
     struct job job = { NULL, NULL, e, model, data, options, 1 };
     int status;
 
-    if (!open_port(&job)) {
+    if (!open_port(&job, options->pes + 1, run_max_len(model))) {
         complain(port, 0, NULL, "no memory for %d PEs", options->pes);
         return 1;
     }

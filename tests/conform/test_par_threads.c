@@ -1,5 +1,5 @@
 /* The parallel IMM on port threads, where PEs really run at the same time: the
- * serial filter's bits for any number of PEs and topology, whoever is faster. */
+ * serial bits for any number of PEs and any topology, whoever is faster. */
 #include "par_case.h"
 
 #include "threads/port_threads.h"
