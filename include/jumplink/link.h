@@ -21,10 +21,11 @@
  * Sessions.  Each end has a session number, new for every start of the
  * program.  HELLO frames tell it to the other end, and the link is up only
  * when a frame has shown that the other end knows ours: a recorded frame, or
- * one of a life of the other end that was over before ours began, never can.  When an end that is up
- * hears of another session of the other end, it asks that session (DOUBT).
- * Only a living other end answers (ALIVE); then it has restarted, and the link
- * fails with JL_EPEER: what was under way cannot be known to have arrived.
+ * one of a life of the other end that was over before ours began, never can.
+ * When an end that is up hears of another session of the other end, it asks
+ * that session (DOUBT).  Only a living other end answers (ALIVE); then it has
+ * restarted, and the link fails with JL_EPEER: what was under way cannot be
+ * known to have arrived.
  *
  * Silence.  An end that is up says something at least every beat_us until the
  * other end knows that it has closed.  One that has listened for silence_us and

@@ -53,8 +53,8 @@ typedef struct jl_lcm_config {
 jl_lcm *jl_lcm_open(const jl_lcm_config *config, const char **why);
 
 /* Close: wait up to linger_us until all that was sent is acknowledged, or its
- * receiver has closed too; then stay 12 rto_us to answer peers that did not hear
- * our last word, unless all have closed and nothing was ever lost. */
+ * receiver has closed too; then stay 12 rto_us to answer peers that did not
+ * hear our last word, unless all have closed and nothing was ever lost. */
 void jl_lcm_close(jl_lcm *lcm, long linger_us);
 
 /* Channels to and from another node; valid until jl_lcm_close.  NULL if there
@@ -62,8 +62,8 @@ void jl_lcm_close(jl_lcm *lcm, long linger_us);
 jl_chan *jl_lcm_tx(jl_lcm *lcm, int node);
 jl_chan *jl_lcm_rx(jl_lcm *lcm, int node);
 
-/* Microseconds since a node was last heard, as far as the last channel call saw;
- * -1 if it is not there (yet) or has closed.  Channels to and from one that
+/* Microseconds since a node was last heard, as far as the last channel call
+ * saw; -1 if it is not there (yet) or has closed.  Channels to and from one that
  * has been silent for silence_us fail with JL_ESILENT, once what came before is
  * fetched. */
 long jl_lcm_silence(const jl_lcm *lcm, int node);

@@ -7,9 +7,9 @@ static int refuse(unsigned long *count, int status)
     return status;
 }
 
-/* Of those that ask for the same piece, before it is acknowledged or its time is
- * out.  A carrier that mixes up what it carries makes for many, and each brings
- * a whole window onto it. */
+/* Of those that ask for the same piece, before it is acknowledged or its time
+ * is out.  A carrier that mixes up what it carries makes for many, and each
+ * brings a whole window onto it. */
 #define ASKS_HEEDED 4
 
 /* frame->ack is the next piece that the other end waits for. */

@@ -691,7 +691,8 @@ static void test_link_hello_repeats(void **state)
     assert_int_equal(jl_link_timer(l, w.now), 20000);
 }
 
-/* Room is told sooner than at half a ring when all that is left is a message whose rest had no room. */
+/* Room is told sooner than at half a ring when all that is left is a message
+ * whose rest had no room. */
 static void test_link_room_for_the_rest(void **state)
 {
     unsigned char out[JL_FRAME_MAX];
