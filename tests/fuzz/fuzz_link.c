@@ -516,7 +516,8 @@ static int quiet(const struct world *w, int i)
            (timer < 0 || (timer > 0 && l->up && w->silence_us > 0));
 }
 
-/* A perfect carrier, programs that receive all, and time that passes.  After
+/* A perfect carrier, programs that receive all, and time that passes, until
+ * there is nothing left to say; nobody sleeps before that.  After
  * restarts one end may have failed (do_recv has checked why), or not know yet
  * that the other is not who it was, because nobody has had a word to say. */
 static void check_arrival(struct world *w)
@@ -549,6 +550,7 @@ static void check_arrival(struct world *w)
                          jl_link_peek(&w->end[1].link) >= 0))
             next = 0;
     }
+    FUZZ_HOLDS(over(w) || (quiet(w, 0) && quiet(w, 1)));
     FUZZ_HOLDS(restarted || w->silence_us > 0 || !over(w));
     for (i = 0; i < 2 && !over(w); i++) {
         FUZZ_HOLDS(w->end[i].link.up);
