@@ -136,6 +136,8 @@ static void check_sound(const struct world *w, const struct end *e)
     FUZZ_HOLDS(apart(l->out_next, l->out_first) <=
                apart(l->out_high, l->out_first));
     FUZZ_HOLDS(jl_link_timer(l, w->now) >= -1);
+    FUZZ_HOLDS(jl_link_silence(l, w->now) >= -1 &&
+               jl_link_silence(l, w->now) <= JL_LINK_MAX_US);
     FUZZ_HOLDS(l->failed == JL_OK || l->failed == JL_ECLOSED ||
                l->failed == JL_EPEER ||
                (l->failed == JL_ESILENT && w->silence_us > 0));
@@ -239,7 +241,8 @@ static void do_restart(struct world *w, int i)
     begin_life(w, i);
 }
 
-/* When nobody is heard for long, and not before, a link fails for silence. */
+/* When nobody is heard for long, and not before, a link fails for silence; also
+ * one whose other end has closed, and has not acknowledged all. */
 static void do_judge(struct world *w, int i)
 {
     jl_link *l = &w->end[i].link;
@@ -247,7 +250,8 @@ static void do_judge(struct world *w, int i)
 
     FUZZ_HOLDS(status == (l->failed == JL_ESILENT ? JL_ESILENT : JL_OK));
     if (l->failed != failed) {
-        FUZZ_HOLDS(failed == JL_OK && status == JL_ESILENT);
+        FUZZ_HOLDS(failed == JL_OK || failed == JL_ECLOSED);
+        FUZZ_HOLDS(status == JL_ESILENT);
         FUZZ_HOLDS(w->end[i].unheard_us >= w->silence_us);
     }
 }
