@@ -5,39 +5,19 @@
 #include "scratch.h"
 #include "program.h"
 
-#include "private_net.h"
+#include "own_net.h"
 
 #define DATA TOP_DIR "/sim/data/"
-#define URL "udpm://239.255.76.67:7667?ttl=0"
-#define ROWS 50000              /* long enough to die in */
 #define LONGEST 40.0            /* seconds; 1 to 5 unless the machine is busy */
 
 static char data[400], model[400], out[400];
 static char *serial;            /* the estimates of all rows */
-static int private_net;
-
-static void write_data(void)
-{
-    FILE *stream;
-    int k;
-
-    snprintf(data, sizeof data, "%s", scratch_path("long.csv"));
-    stream = fopen(data, "w");
-    scratch_must(stream != NULL, data);
-    fputs("t_s,z0,z1\n", stream);
-    for (k = 0; k < ROWS; k++)
-        fprintf(stream, "%d,%d,%d\n", k, 10 * k, k % 7);
-    scratch_must(fclose(stream) == 0, data);
-}
 
 static int setup(void **state)
 {
     scratch_setup(state);
-    private_net = private_net_enter() == 0;
-    if (!private_net)
-        print_message("no private network is allowed here: %s\n",
-                      strerror(errno));
-    write_data();
+    own_net_enter();
+    snprintf(data, sizeof data, "%s", endless_record("long.csv"));
     snprintf(model, sizeof model, "%s",
              program_copy("eight_modes.json", DATA "eight_modes.json"));
     snprintf(out, sizeof out, "%s", scratch_path("out.csv"));
@@ -55,11 +35,6 @@ static int teardown(void **state)
     return scratch_teardown(state);
 }
 
-#define needs_private_net() do { \
-    if (!private_net) \
-        skip(); \
-} while (0)
-
 /* --- what must be true after a death ------------------------------------- */
 
 /* The file holds the beginning of the serial estimates, and says so. */
@@ -75,7 +50,7 @@ static void check_partial(void)
     assert_non_null(mark);
     assert_int_equal(sscanf(mark, "# partial: %ld of %ld rows\n", &rows, &of),
                      2);
-    assert_int_equal(of, ROWS);
+    assert_int_equal(of, ENDLESS_ROWS);
     assert_memory_equal(text, serial, (size_t)(mark - text));
     for (end = text; end < mark; end++)
         rows -= *end == '\n';
@@ -139,7 +114,7 @@ static void test_death_of_a_pe_is_named_at_any_moment(void **state)
     int k;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     for (k = 0; k < 16; k++) {
         struct program p;
         char words[80];
@@ -159,7 +134,7 @@ static void test_death_by_silence_is_named_and_not_the_relay(void **state)
     int k;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     for (k = 0; k < 8; k++) {
         struct program p;
         char words[80];
@@ -189,7 +164,7 @@ static void test_death_interrupted_keeps_what_is_done(void **state)
     int k;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     for (k = 0; k < 12; k++) {
         const char *const told[] = {
             "filter", model, data, "--pes", "4", "--timeout", "1", "-o", out,
@@ -222,7 +197,7 @@ static void test_death_of_the_host_ends_its_pes(void **state)
     struct program p;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     start_run(&p, "4", "full");
     (void)find_pe(3);
     program_sleep(0.3);
@@ -234,7 +209,7 @@ static void test_death_of_the_host_ends_its_pes(void **state)
 
 /* --- by hand ------------------------------------------------------------- */
 
-#define BY_HAND "--pes", "2", "--lcm-url", URL, "--timeout", "1"
+#define BY_HAND "--pes", "2", "--lcm-url", OWN_NET_URL, "--timeout", "1"
 
 static void start_by_hand(struct program *p)
 {
@@ -257,7 +232,7 @@ static void test_death_by_hand_of_the_host_ends_pes(void **state)
     struct program p[3];
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     start_by_hand(p);
     kill(p[2].pid, SIGKILL);
     program_end(&p[2], LONGEST);
@@ -274,7 +249,7 @@ static void test_death_by_hand_of_a_pe_is_named(void **state)
     int k, pe;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     for (k = 0; k < 4; k++) {
         char words[40];
 

@@ -206,7 +206,7 @@ static void check_log(const char *path)
 static void test_tools_record_a_run_by_hand(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     record(whole, run_by_hand);
     check_log(whole);
 }
@@ -216,7 +216,7 @@ static void test_tools_record_a_filter(void **state)
     const char *path = scratch_path("filter.log");
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     record(path, run_filter);
     check_log(path);
 }
@@ -271,14 +271,14 @@ static void check_plays(const char *path, const char *port,
 static void test_tools_play_a_whole_log(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     check_plays(whole, "lcm", ".*", 0, estimates);
 }
 
 static void test_tools_play_the_measurements(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     check_plays(whole, "loop", "JL\\." RUN "\\.measurement", 0, estimates);
 }
 
@@ -340,7 +340,7 @@ static void test_tools_play_a_log_with_holes(void **state)
     char holes[400];
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     keep(holes, scratch_path("holes.log"));
     write_holes(holes);
     run_jumplink("filter", two, write_blanks());

@@ -159,14 +159,14 @@ static void check_everything_is_counted(const char *port)
 static void test_live_counts_everything_over_lcm(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     check_everything_is_counted("lcm");
 }
 
 static void test_live_counts_everything_over_loop(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     check_everything_is_counted("loop");
 }
 
@@ -180,7 +180,7 @@ static void test_live_starts_at_the_first_that_arrived(void **state)
     struct program *p;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     sub = jumplink_estimate_subscribe(live_lcm, "JL.late.estimate",
                                       on_estimate, &answers);
     p = live_filter(two, "late", folder, "loop");
@@ -204,7 +204,7 @@ static void test_live_fills_a_long_gap(void **state)
     struct program *p;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     p = live_filter(two, "gap", folder, "loop");
     send("gap", 0, 0, 0);
     send("gap", 10001, 100.01, 0);
@@ -221,7 +221,7 @@ static void test_live_runs_do_not_mix(void **state)
     struct program *p;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     p = live_filter(two, "one", folder, "lcm");
     send("one", 1, 1, 0);
     send("other", 2, 2, 0);
@@ -246,7 +246,7 @@ static void test_live_survives_any_octets(void **state)
     int i, length;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     memset(octets, 0, sizeof octets);
     message.z = z;
     length = jumplink_measurement_encode(octets, 0, sizeof octets, &message);
@@ -278,7 +278,7 @@ static void test_live_survives_any_octets(void **state)
 static void test_live_nothing_comes(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     run_jumplink("sim", "--input", "lcm", "--model", two, "--lcm-url",
                  LIVE_URL, "--pes", "2", "--start", "1.5", "-o", folder);
     if (ran.status != 1 || strstr(ran.err, "JL.jumplink.measurement: no "
@@ -293,7 +293,7 @@ static void test_live_nothing_of_use_comes(void **state)
     struct program *p;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     p = live_start(JUMPLINK, "sim", "--input", "lcm", "--model", two,
                    "--lcm-url", LIVE_URL, "--run", "three", "--port", "loop",
                    "--start", "2", "-o", folder);
@@ -314,7 +314,7 @@ static void test_live_killed_pe_while_waiting(void **state)
     pid_t pe = 0;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     p = live_filter(two, "killed", folder, "lcm");
     send("killed", 1, 1, 0);
     while (program_find("--pe 1", two, &pe) != 1) {
@@ -343,7 +343,7 @@ static void test_live_without_a_network(void **state)
     struct program p;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     program_start_file(&p, JUMPLINK, lose_the_network, told);
     program_end(&p, PROGRAM_LIMIT);
     check_refused(&p, 1, LIVE_URL "|LCM cannot be used");
@@ -452,7 +452,7 @@ static void test_live_copies_of_many_states(void **state)
     int count = 0;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     model = write_many();
     csv = scratch_write("many.csv", "k,z0\n1,1\n2,3\n3,2\n4,2.5\n5,1\n");
     sub = jumplink_estimate_subscribe(live_lcm, "JL.jumplink.estimate",
@@ -490,7 +490,7 @@ static void test_live_copies_of_a_failed_step(void **state)
     char text[80];
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     snprintf(text, sizeof text, "t_s,z0,z1\n0,0,0\n1,1,1\n2,%s,1\n3,1,1\n",
              JL_REAL_FLOAT ? "1e30" : "1e300");     /* above JL_LARGE */
     csv = scratch_write("failing.csv", text);

@@ -8,7 +8,7 @@
 
 #include <lcm/lcm.h>
 
-#include "private_net.h"
+#include "own_net.h"
 
 #define DATA TOP_DIR "/sim/data/"
 #define URL "udpm://239.255.76.67:7667?ttl=1"
@@ -190,21 +190,6 @@ static int make_switch(void)
                  "ip link add v0 type veth peer name w0; } 2>/dev/null") == 0;
 }
 
-/* A record that takes long enough for something to happen. */
-static void write_endless(void)
-{
-    FILE *stream;
-    int k;
-
-    keep(endless, scratch_path("endless.csv"));
-    stream = fopen(endless, "w");
-    scratch_must(stream != NULL, endless);
-    fputs("t_s,z0,z1\n", stream);
-    for (k = 0; k < 50000; k++)
-        fprintf(stream, "%d,%d,%d\n", k, 10 * k, k % 7);
-    scratch_must(fclose(stream) == 0, endless);
-}
-
 static int kill_all(void **state)
 {
     int i;
@@ -221,7 +206,7 @@ static int setup(void **state)
     keep(data, program_head("flight.csv", DATA "sightseeing_1hz.csv",
                             ROWS + 1));
     keep(two, program_copy("two_modes.json", DATA "two_modes.json"));
-    write_endless();
+    keep(endless, endless_record("endless.csv"));
     run_jumplink("filter", two, data, FLIGHT);
     scratch_must(ran.status == 0, "jumplink filter");
     serial = ran.out;

@@ -9,19 +9,17 @@
 #include <sched.h>
 
 #include "jumplink/config.h"
-#include "private_net.h"
+#include "own_net.h"
 
 #define DATA TOP_DIR "/sim/data/"
-#define URL "udpm://239.255.76.67:7667?ttl=0"
 #define LEAVING 15              /* seconds; 1 to 4 unless the machine is busy */
 #define FLIGHT "--z", "east_m,north_m"
-#define BY_HAND "--pes", "2", "--lcm-url", URL, PATIENTLY
+#define BY_HAND "--pes", "2", "--lcm-url", OWN_NET_URL, PATIENTLY
 #define PATIENTLY "--timeout", "20"     /* on a machine that is busy */
 #define IN_VAIN "--start", "1.5"        /* where somebody does not come */
 
 static char data[400], two[400], eight[400];
 static char *serial;            /* the estimates of data by two */
-static int private_net;
 
 static void keep(char *to, const char *path)
 {
@@ -31,10 +29,7 @@ static void keep(char *to, const char *path)
 static int setup(void **state)
 {
     scratch_setup(state);
-    private_net = private_net_enter() == 0;
-    if (!private_net)
-        print_message("no private network is allowed here: %s\n",
-                      strerror(errno));
+    own_net_enter();
     keep(data, program_head("flight.csv", DATA "carrier_held_1hz.csv", 201));
     keep(two, program_copy("two_modes.json", DATA "two_modes.json"));
     keep(eight, program_copy("eight_modes.json", DATA "eight_modes.json"));
@@ -51,11 +46,6 @@ static int teardown(void **state)
     free(serial);
     return scratch_teardown(state);
 }
-
-#define needs_private_net() do { \
-    if (!private_net) \
-        skip(); \
-} while (0)
 
 /* --- by hand ------------------------------------------------------------- */
 
@@ -106,7 +96,7 @@ static void test_network_by_hand_in_any_order(void **state)
     size_t i, k;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     for (i = 0; i < sizeof orders / sizeof *orders; i++) {
         struct program p[3];
 
@@ -125,7 +115,7 @@ static void test_network_two_runs_at_once(void **state)
     int i;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     for (i = 0; i < 3; i++) {
         start(&a[i], "01h"[i], "one");
         start(&b[i], "h10"[i], "other_1");
@@ -141,7 +131,7 @@ static void test_network_waits_for_the_others(void **state)
     struct program host, pe;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     program_start(&host, "host", two, data, FLIGHT, BY_HAND, "--timeout",
                   "0.2");
     program_start(&pe, "pe", "--pe", "0", "--model", two, BY_HAND,
@@ -200,7 +190,7 @@ static void check_mismatch_told(const char *const *told)
 static void test_network_different_pes_are_refused(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     check_mismatch("--model", eight);
     check_mismatch("--model", two, "--form", "standard");
     check_mismatch("--model", two, "--filter", "kf", "--mode", "1");
@@ -212,7 +202,7 @@ static void test_network_host_with_another_model(void **state)
     struct program p[3];
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     start(&p[0], '0', "host");
     start(&p[1], '1', "host");
     program_start(&p[2], "host", eight, data, FLIGHT, BY_HAND, "--run",
@@ -255,7 +245,7 @@ static void test_network_pe_with_another_type_of_number(void **state)
     struct program p[3];
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     program_start(&p[0], "host", two, data, FLIGHT, BY_HAND, "--start", "3");
     program_start(&p[1], "pe", "--pe", "0", "--model", two, BY_HAND, "--start",
                   "3");
@@ -290,7 +280,7 @@ static void check_missing(const char *there, const char *words)
 static void test_network_missing_pe(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     check_missing("0", "PE0: no word from PE1");
     check_missing("1", "PE1: no word from PE0");
 }
@@ -298,7 +288,7 @@ static void test_network_missing_pe(void **state)
 static void test_network_host_alone(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     run_jumplink("host", two, data, FLIGHT, BY_HAND, IN_VAIN);
     check_refused(&ran, 1, "does not start");
     assert_true(ran.seconds < LEAVING);

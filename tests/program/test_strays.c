@@ -5,7 +5,7 @@
 #include "program.h"
 #include "stranger.h"
 
-#include "private_net.h"
+#include "own_net.h"
 
 #define DATA TOP_DIR "/sim/data/"
 #define RUN "--pes", "3", "--lcm-url", STRANGER_URL, "--timeout", "20"
@@ -13,15 +13,11 @@
 
 static char data[400], model[400], tape[400];
 static char *serial;            /* the estimates of data by model */
-static int private_net;
 
 static int setup(void **state)
 {
     scratch_setup(state);
-    private_net = private_net_enter() == 0;
-    if (!private_net)
-        print_message("no private network is allowed here: %s\n",
-                      strerror(errno));
+    own_net_enter();
     strcpy(data, program_copy("flight.csv", DATA "sightseeing_1hz.csv"));
     strcpy(model, program_copy("eight_modes.json", DATA "eight_modes.json"));
     strcpy(tape, scratch_path("tape"));
@@ -38,11 +34,6 @@ static int teardown(void **state)
     free(serial);
     return scratch_teardown(state);
 }
-
-#define needs_private_net() do { \
-    if (!private_net) \
-        skip(); \
-} while (0)
 
 /* --- checks -------------------------------------------------------------- */
 
@@ -110,7 +101,7 @@ static void test_strays_from_before_the_start(void **state)
     int i;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     stranger = stranger_start("strays", 4);
     start_by_hand(p, "strays");
     end_by_hand(p);
@@ -128,7 +119,7 @@ static void test_strays_replayed_run(void **state)
     int i;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     stranger = stranger_record(tape);
     start_by_hand(p, "again");
     end_by_hand(p);
@@ -160,7 +151,7 @@ static void test_strays_in_a_filter(void **state)
     char run[20];
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     program_start(&p, "filter", model, data, FLIGHT, RUN);
     snprintf(run, sizeof run, "r%d_1", (int)p.pid);
     stranger = stranger_start(run, 3);
