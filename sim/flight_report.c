@@ -192,7 +192,8 @@ static void print_csv(const struct flight_report *r, FILE *out)
     int i;
 
     fputs("model,positions,velocity_rms_mps,steps,step_median_us,step_p99_us,"
-          "serial_median_us,messages,octets,resent,same_bits,apart_sigma,partial\n", out);
+          "serial_median_us,messages,octets,resent,same_bits,apart_sigma,"
+          "partial\n", out);
     for (i = 0; i < r->count; i++) {
         const struct flight_run *run = &r->runs[i];
         double median, p99;

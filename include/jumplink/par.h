@@ -23,7 +23,11 @@
  * to rounding; the same bits for any topology and transport.
  *
  * When a PE cannot go on because of another, it tells its neighbours whose
- * fault it is, and they theirs, so that no relay is blamed for a dead PE.
+ * fault it is, and they theirs, so that no relay is blamed for a dead PE.  That
+ * needs channels that notice an end that closed or fell silent before the
+ * deadline of a message passes (link.h: silence_us).  By deadlines alone, a PE
+ * that hangs between two messages of an exchange may leave some PEs one step
+ * ahead of others, and one that lives may be blamed.
  */
 #ifndef JL_PAR_H
 #define JL_PAR_H
@@ -80,7 +84,8 @@ int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, unsigned char *buf,
                   int cap, long timeout_us);
 
 /* Send a measurement with m components; receive the answer to each before the
- * next, or at most 2 slots + 1 may be on their way (slots of the channels). buf [cap], cap >= JL_PAR_MSG(1, 1, m).
+ * next, or at most 2 slots + 1 may be on their way (slots of the channels).
+ * buf [cap], cap >= JL_PAR_MSG(1, 1, m).
  * Returns JL_OK, JL_ENOMEM, or the channel's error. */
 int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,
                  unsigned char *buf, int cap, long timeout_us);
@@ -100,11 +105,11 @@ int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,
 
 /* --- the PE's side ----------------------------------------------------- */
 
-/* Called before a step on every PE that owns modes, with the same arguments: for
- * models rebuilt for meas->dt (jl_mode_motion, then jl_imm_chain), or started
- * from a first measurement (jl_imm_set).  Must do the same on every PE, and if
- * it changes a mode it must also call jl_imm_chain or jl_imm_set, which void
- * what was computed ahead.
+/* Called before a step on every PE that owns modes, with the same arguments:
+ * for models rebuilt for meas->dt (jl_mode_motion, then jl_imm_chain), or
+ * started from a first measurement (jl_imm_set).  Must do the same on every
+ * PE, and if it changes a mode it must also call jl_imm_chain or jl_imm_set,
+ * which void what was computed ahead.
  * Returns JL_OK (now the step), JL_STARTED (the measurement was used to set
  * the state: no step), or a negative code: the step fails with it. */
 #define JL_STARTED 1
@@ -132,8 +137,9 @@ typedef struct jl_par_config {
     long start_us;              /* longest wait for the others at the start */
     long timeout_us;            /* ... and for each message of a step; an
                                    eighth more for each that must come
-                                   before it (jl_hop.level); either may be JL_FOREVER; the wait for the
-                                   next measurement has no limit            */
+                                   before it (jl_hop.level); either may be
+                                   JL_FOREVER; the wait for the next
+                                   measurement has no limit                 */
 } jl_par_config;
 
 typedef struct jl_par {
@@ -180,11 +186,11 @@ int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
 int jl_par_serve(jl_par *par, jl_real *scratch);
 
 /* One step, when the measurement is already on every PE and every PE calls
- * this: returns on all of them that own modes the same JL_OK or code of the first mode that
- * failed, as jl_imm_step, or JL_ECHAIN (an all-reduce and a chain that is not
- * sticky); or the error of the channel that failed.  The combined estimate is
- * computed on PE0 (on the others call jl_imm_combine; an all-reduce computes it
- * on all, and jl_imm_combine is of no use).
+ * this: returns on all of them that own modes the same JL_OK or code of the
+ * first mode that failed, as jl_imm_step, or JL_ECHAIN (an all-reduce and a
+ * chain that is not sticky); or the error of the channel that failed.  The
+ * combined estimate is computed on PE0 (on the others call jl_imm_combine; an
+ * all-reduce computes it on all, and jl_imm_combine is of no use).
  * After the error of a channel the PEs may differ: the run is over. */
 int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch);
 

@@ -16,8 +16,9 @@
  * What is marked - is 0.  READY bears the PE that its numbers are of: a PE
  * passes on those that differ from its own.  MODES lists, in index order, the
  * modes of the PEs whose blocks the hop carries; (x, P) follow of each of them,
- * or, in an all-reduce, the pool of each of those PEs, at the place of the first
- * of its modes.  FAULT names the PE (npe: the host) that cannot be gone on with.
+ * or, in an all-reduce, the pool of each of those PEs, at the place of the
+ * first of its modes.  FAULT names the PE (npe: the host) that cannot be gone
+ * on with.
  */
 #ifndef JL_PAR_MSG_H
 #define JL_PAR_MSG_H
