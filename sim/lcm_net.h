@@ -28,8 +28,7 @@ int lcm_node_open(struct lcm_node *node, int which, const char *url,
 /* Add what this node sent, and what it refused. */
 void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic);
 
-/* After a run that went well: if datagrams were refused, a line that says so.
- */
+/* After a run that went well: if datagrams were refused, a line says so. */
 void lcm_say_refused(const struct traffic *traffic);
 
 /* After a failure: the PE that has been silent for longest, and for half of the

@@ -45,43 +45,59 @@ int run_failed(const struct data_file *data, long row, int status,
 /* Between looks at whether everybody is alive. */
 #define SLICE_US 100000L
 
-/* Receive within the deadline, in slices.  `estimate` NULL: the ready word. */
-static int receive(struct run_host *host, jl_estimate *estimate,
-                   jl_u32 fingerprint, const struct model *model,
-                   unsigned char *buf, int cap, long timeout_us)
+/* How late PE0 may tell of a PE that does not come: it, or one that tells it,
+ * waits for as many eighths more as messages must come before (par.h), at most
+ * 2 a PE in an exchange, and 3 at the start. */
+static long latest_us(long us, int messages)
 {
-    long slice, left = timeout_us;
+    return us + us / 8 * messages + 1000000;
+}
+
+/* Receive an answer, in slices; `estimate` NULL: the ready word.  A live run
+ * is interrupted between two answers only: that is how it ends. */
+static int receive(struct run_host *host, jl_estimate *estimate,
+                   const struct model *model, const struct options *options,
+                   unsigned char *buf, int cap)
+{
+    long left = estimate == NULL
+        ? latest_us(options->start_us, 3 * options->pes)
+        : latest_us(options->timeout_us, 2 * options->pes), slice;
     int status;
 
     do {
         slice = left < SLICE_US ? left : SLICE_US;
         left -= slice;
         status = estimate == NULL
-            ? jl_host_ready(host->from, fingerprint, buf, cap, slice)
+            ? jl_host_ready(host->from, run_fingerprint(model, options), buf,
+                            cap, slice)
             : jl_host_recv(host->from, estimate, model->M, model->n, buf, cap,
                            slice);
-        if (status == JL_ETIMEOUT && interrupted() != NULL)
+        if (estimate != NULL)
+            host->failed_pe = estimate->failed_pe;
+        if (status != JL_ETIMEOUT || host->failed_pe >= 0)
+            return status;              /* a timeout may be another's */
+        if (interrupted() != NULL
+            && (estimate == NULL || options->live == NULL))
             return RUN_INTERRUPTED;
-        if (status == JL_ETIMEOUT && host->alive != NULL
-            && !host->alive(host->context))
+        if (host->alive != NULL && !host->alive(host->context))
             return JL_ECLOSED;
-    } while (status == JL_ETIMEOUT && left > 0);
-    if (status < 0 && estimate != NULL)
-        host->failed_pe = estimate->failed_pe;
+    } while (left > 0);
     return status;
 }
 
 static int host_row(struct estimates *e, long row,
                     struct run_host *host, const jl_meas *meas,
                     jl_estimate *estimate, const struct model *model,
-                    unsigned char *buf, int cap, long timeout_us)
+                    const struct options *options, unsigned char *buf,
+                    int cap)
 {
     double before = clock_us();
     int is_start = meas->first && model->x0 == NULL;
-    int status = jl_host_send(host->to, meas, model->m, buf, cap, timeout_us);
+    int status = jl_host_send(host->to, meas, model->m, buf, cap,
+                              options->timeout_us);
 
     if (status == JL_OK)
-        status = receive(host, estimate, 0, model, buf, cap, timeout_us);
+        status = receive(host, estimate, model, options, buf, cap);
     if (status == JL_OK && estimate->seq != meas->seq)
         status = JL_EMSG;
     if (status == JL_OK)
@@ -91,14 +107,6 @@ static int host_row(struct estimates *e, long row,
                        estimate->loglik,
                        is_start ? (double)NAN : clock_us() - before);
     return status;
-}
-
-/* The answer to a measurement may come as late as the last deadline of a PE:
- * no hop's level is beyond 2 pes (plan.h). */
-static long answer_us(const struct options *options)
-{
-    return options->timeout_us + options->timeout_us / 8 * 2 * options->pes
-        + 1000000;
 }
 
 /* The longest look at the network for a measurement, and then the links. */
@@ -115,10 +123,10 @@ static int keep_going(struct run_host *host, const struct model *model,
     host->failed_pe = estimate->failed_pe;
     if (status == JL_OK)
         return JL_EMSG;
-    if (status == JL_ETIMEOUT && host->alive != NULL
-        && !host->alive(host->context))
-        return JL_ECLOSED;
-    return status == JL_ETIMEOUT ? JL_OK : status;
+    if (status != JL_ETIMEOUT || host->failed_pe >= 0)
+        return status;
+    return host->alive != NULL && !host->alive(host->context) ? JL_ECLOSED
+                                                              : JL_OK;
 }
 
 /* JL_OK: the record has the row; LIVE_END: it is over; or why it cannot. */
@@ -161,8 +169,8 @@ static int host_rows(struct estimates *e, long *row,
         fed = feed_meas(&feed, *row, &meas);
         typed_measurement(typed, *row, fed ? meas.z : NULL);
         if (fed)
-            status = host_row(e, *row, host, &meas, estimate, model, buf, cap,
-                              answer_us(options));
+            status = host_row(e, *row, host, &meas, estimate, model, options,
+                              buf, cap);
         if (fed && (status == JL_OK || !run_is_channels(status)))
             typed_estimate(typed, *row, estimate);
         if (status == JL_OK && options->live == NULL && interrupted() != NULL)
@@ -196,8 +204,7 @@ int run_host(struct estimates *e, long *row, struct run_host *host,
     estimate.x = mem;
     estimate.P = mem + n;
     estimate.mu = estimate.P + n * n;
-    status = receive(host, NULL, run_fingerprint(model, options), model, buf,
-                     cap, options->start_us + 1000000);
+    status = receive(host, NULL, model, options, buf, cap);
     if (status == JL_OK) {
         typed_open(&typed, model, data, options);
         status = host_rows(e, row, host, model, data, options, &estimate, buf,

@@ -64,7 +64,7 @@ int run_pe(int pe, const struct model *model, const struct options *options,
     jl_real *z = calloc((size_t)model->m, sizeof *z);
     jl_par_config config;
     struct bank bank;
-    jl_par par;
+    jl_par par = { .failed = JL_OK };   /* also if its init refuses */
 
     if (owner == NULL || buf == NULL || mode_status == NULL || z == NULL
         || bank_open(&bank, model, options->form) != 0) {

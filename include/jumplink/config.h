@@ -36,7 +36,8 @@
 #error "JL_MAX_MODES must be 1 to 1024"
 #endif
 
-/* Processing elements of one run. */
+/* Processing elements of one run.  Each costs ten octets of a jl_par, so the
+ * library and its users must agree. */
 #ifndef JL_MAX_PES
 #define JL_MAX_PES 16
 #endif

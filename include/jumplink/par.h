@@ -23,7 +23,11 @@
  * to rounding; the same bits for any topology and transport.
  *
  * When a PE cannot go on because of another, it tells its neighbours whose
- * fault it is, and they theirs, so that no relay is blamed for a dead PE.
+ * fault it is, and they theirs, so that no relay is blamed for a dead PE.  That
+ * needs channels that notice an end that closed or fell silent before the
+ * deadline of a message passes (link.h: silence_us).  By deadlines alone, a PE
+ * that hangs between two messages of an exchange may leave some PEs one step
+ * ahead of others, and one that lives may be blamed.
  */
 #ifndef JL_PAR_H
 #define JL_PAR_H
@@ -103,9 +107,9 @@ int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,
 
 /* Called before a step on every PE that owns modes, with the same arguments:
  * for models rebuilt for meas->dt (jl_mode_motion, then jl_imm_chain), or
- * started from a first measurement (jl_imm_set).  Must do the same on every PE, and if
- * it changes a mode it must also call jl_imm_chain or jl_imm_set, which void
- * what was computed ahead.
+ * started from a first measurement (jl_imm_set).  Must do the same on every
+ * PE, and if it changes a mode it must also call jl_imm_chain or jl_imm_set,
+ * which void what was computed ahead.
  * Returns JL_OK (now the step), JL_STARTED (the measurement was used to set
  * the state: no step), or a negative code: the step fails with it. */
 #define JL_STARTED 1
@@ -185,8 +189,8 @@ int jl_par_serve(jl_par *par, jl_real *scratch);
  * this: returns on all of them that own modes the same JL_OK or code of the
  * first mode that failed, as jl_imm_step, or JL_ECHAIN (an all-reduce and a
  * chain that is not sticky); or the error of the channel that failed.  The
- * combined estimate is computed on PE0 (on the others call jl_imm_combine; an all-reduce computes it
- * on all, and jl_imm_combine is of no use).
+ * combined estimate is computed on PE0 (on the others call jl_imm_combine; an
+ * all-reduce computes it on all, and jl_imm_combine is of no use).
  * After the error of a channel the PEs may differ: the run is over. */
 int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch);
 

@@ -22,8 +22,12 @@ int jli_par_fault(jl_par *par, int pe, int status)
  * those who wait for later ones lose patience. */
 static long patience(long timeout_us, int level)
 {
-    return timeout_us == JL_FOREVER ? JL_FOREVER
-        : timeout_us + timeout_us / 8 * level;
+    long more = timeout_us / 8;
+
+    if (timeout_us == JL_FOREVER)
+        return JL_FOREVER;
+    return level > 0 && more > (LONG_MAX - timeout_us) / level
+        ? LONG_MAX : timeout_us + more * level;
 }
 
 /* 1, and it is noted, if what came from a neighbour [len] tells of a failure

@@ -49,8 +49,9 @@ void jli_pool_own(jl_par *par)
     int j, n = imm->n;
     jl_real *x = par->pool, *P = x + n, best = -JL_REAL_MAX, sum = 0, unused;
 
-    for (j = 0; j < imm->M; j++)
-        if (is_own(par, j) && imm->l[j] > best)
+    for (j = 0; j < imm->M; j++)        /* of those that are possible */
+        if (is_own(par, j) && imm->logc[j] >= -JL_REAL_MAX
+            && imm->l[j] > best)
             best = imm->l[j];
     for (j = 0; j < imm->M; j++)        /* log 0 of the others */
         imm->e[j] = is_own(par, j) ? imm->logc[j] + (imm->l[j] - best)

@@ -11,7 +11,7 @@ struct list {
 
 static void add(struct list *list, int from, int to, int first, int count)
 {
-    jl_hop *hop = &list->hops[list->count];
+    jl_hop *hop;
     int *a = &list->level[from], *b = &list->level[to];
     int level = *a > *b ? *a : *b;
 
@@ -20,6 +20,7 @@ static void add(struct list *list, int from, int to, int first, int count)
         return;
     if (list->count++ >= list->cap)
         return;
+    hop = &list->hops[list->count - 1];
     hop->from = (unsigned char)from;
     hop->to = (unsigned char)to;
     hop->first = (unsigned char)((first + list->npe) % list->npe);

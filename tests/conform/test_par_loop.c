@@ -24,7 +24,8 @@ static void body(int node, void *context)
             to[i] = jl_loop_tx(run->loop, node, i);
             from[i] = jl_loop_rx(run->loop, i, node);
         }
-    from[node] = jl_loop_rx(run->loop, npe + 1, node);
+    if (node <= npe)
+        from[node] = jl_loop_rx(run->loop, npe + 1, node);
     if (node > npe)
         (void)jl_chan_recv(jl_loop_rx(run->loop, run->shape.hangs, node),
                            NULL, 0, PAR_ASLEEP_US);
