@@ -19,7 +19,7 @@
 /* How long PEs may take to leave after the end of a run, and to say what was
  * wrong after a failure. */
 #define LEAVE_US 10e6
-#define FAIL_US 1e6
+#define FAIL_US 3e5
 
 struct pe {
     pid_t pid;                  /* 0: not started, or waited for            */

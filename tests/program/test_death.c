@@ -115,7 +115,7 @@ static void test_death_of_a_pe_is_named_at_any_moment(void **state)
 
     (void)state;
     needs_own_net();
-    for (k = 0; k < 16; k++) {
+    for (k = 0; k < 12; k++) {
         struct program p;
         char words[80];
         int pe = (k + k / 4) % 4;
@@ -135,7 +135,7 @@ static void test_death_by_silence_is_named_and_not_the_relay(void **state)
 
     (void)state;
     needs_own_net();
-    for (k = 0; k < 8; k++) {
+    for (k = 0; k < 6; k++) {
         struct program p;
         char words[80];
         int pe = k % 4;
