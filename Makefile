@@ -112,7 +112,7 @@ check: deps
 # tests/<folder>/test_x.c becomes $(BUILD)/tests/test_x and
 # $(BUILD)/tests_f32/test_x; other .c files help the tests of their folder.
 # A test knows the checkout (TOP_DIR) and its program (JUMPLINK) by macros.
-TEST_FOLDERS := unit golden conform program
+TEST_FOLDERS := unit golden conform fault program
 TESTING = $(HOST) -Isrc -Itests -I$(BUILD)/golden -DTOP_DIR='"$(CURDIR)"' \
     -DJUMPLINK='"$(abspath $(BUILD)/jumplink$(1))"'
 
