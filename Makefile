@@ -7,6 +7,7 @@
 #   make test       every test, with double and with float
 #   make check      standards, layers, symbols, cross-builds
 #   make sanitize   every test under AddressSanitizer and UBSan
+#   make tsan       the tests of PEs on threads, under ThreadSanitizer
 #   make deps       install the packages that sim and test need
 #   make install    libraries, headers, program to $(DESTDIR)$(PREFIX)
 #   make clean
@@ -34,11 +35,12 @@ HAVE_JANSSON := $(call have,jansson.h)
 PROGRAMS := $(if $(and $(HAVE_LCM),$(HAVE_JANSSON),$(wildcard sim/main.c)),$(BUILD)/jumplink $(BUILD)/jumplink_f32)
 
 CORE_SRC := $(wildcard src/*/*.c)
-PORT_SRC := $(wildcard port/loop/*.c) $(if $(HAVE_LCM),$(wildcard port/lcm/*.c))
+PORT_SRC := $(wildcard port/loop/*.c port/threads/*.c) $(if $(HAVE_LCM),$(wildcard port/lcm/*.c))
 SIM_SRC := $(wildcard sim/*.c)
 LIBS := -Wl,--as-needed -llcm -ljansson -lm
 
-.PHONY: all lib deps sim test golden run-tests check sanitize install clean force
+.PHONY: all lib deps sim test golden run-tests check sanitize tsan run-tsan \
+    install clean force
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -102,6 +104,9 @@ sanitize: deps
 	$(AGAIN) run-tests BUILD=$(BUILD)/sanitize \
 	    CFLAGS='-O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all'
 
+tsan: deps
+	$(AGAIN) run-tsan BUILD=$(BUILD)/tsan CFLAGS='-O1 -g -fsanitize=thread'
+
 check: deps
 	@CC='$(CC)' sh tests/check/deps.sh check
 	$(AGAIN) golden
@@ -145,6 +150,10 @@ $(BUILD)/gen_golden: tests/golden/gen_golden.c $(BUILD)/flags
 run-tests: $(TESTS) $(PROGRAMS) lib
 	@CC='$(CC)' CFLAGS='$(CFLAGS)' BUILD='$(BUILD)' sh tests/check/run_tests.sh \
 	    $(sort $(TESTS)) tests/check/test_mixing.sh tests/check/test_readme.sh
+
+# No fork: what ThreadSanitizer watches are threads.
+run-tsan: $(foreach t,conform_loop conform_threads par_loop par_threads,$(BUILD)/tests/test_$(t) $(BUILD)/tests_f32/test_$(t))
+	@sh tests/check/run_tests.sh $^
 
 # --- the rest ------------------------------------------------------------
 

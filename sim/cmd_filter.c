@@ -15,8 +15,9 @@ static const char help[] =
     DATA_HELP
     "  --pes P           run on this many PEs (default 4 with --port, else\n"
     "                    serial)\n"
-    "  --port lcm|loop   ... that are processes and talk over LCM (default\n"
-    "                    with --pes), or threads that take turns\n"
+    "  --port lcm|threads|loop  ... that are processes and talk over LCM\n"
+    "                    (default with --pes), or threads, or threads that\n"
+    "                    take turns\n"
     PORT_HELP
     HELP_HELP;
 

@@ -28,8 +28,8 @@ static const char help[] =
     "                    the source folder: sim/data/two_modes.json and\n"
     "                    eight_modes.json)\n"
     "  -o, --out DIR     where results go (default build/sim)\n"
-    "  --port lcm|loop   processes over LCM (default), or threads that\n"
-    "                    take turns\n"
+    "  --port lcm|threads|loop  processes over LCM (default), or threads,\n"
+    "                    or threads that take turns\n"
     "  --pes P           PEs (default 4)\n"
     COMMON_HELP
     "  --hold none|detect|column  only this way with held positions\n"

@@ -26,7 +26,9 @@ int complain(const char *file, long line, const char *field,
     for (p = text; *p != '\0'; p++)     /* UTF-8 passes, controls do not */
         if ((unsigned char)*p < ' ' || *p == 127)
             *p = '?';
+    flockfile(stderr);                  /* others may be drawing progress */
     progress_clear();
     fprintf(stderr, "%s\n", text);
+    funlockfile(stderr);
     return -1;
 }

@@ -157,7 +157,8 @@ static void print_table(const struct flight_report *r, FILE *out)
 
     fprintf(out, "%s: %ld rows, %d PEs over %s, %s, %s\n", r->data->path,
             r->data->rows, r->options->pes,
-            r->options->port == PORT_LCM ? "LCM" : "loop",
+            r->options->port == PORT_LCM ? "LCM"
+                : options_port_name(r->options->port),
             r->options->form == &jl_kf_joseph ? "Joseph" : "standard",
             JL_REAL_FLOAT ? "float" : "double");
     fprintf(out, HEAD, "", "held", "velocity", "", "step, us", "", "serial",

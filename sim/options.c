@@ -61,18 +61,28 @@ int option_seconds(long *us, const char *command, const char *option,
     return 0;
 }
 
+static const char *const ports[] = { "loop", "threads", "lcm", NULL };
+
+const char *options_port_name(enum port port)
+{
+    return ports[port - PORT_LOOP];
+}
+
 /* The index of value among names (ending in NULL), or -1 after a message. */
 static int choose(const char *command, const char *option, const char *value,
                   const char *const *names)
 {
-    int i;
+    char known[100] = "";
+    int i, used = 0;
 
-    for (i = 0; names[i] != NULL; i++)
+    for (i = 0; names[i] != NULL; i++) {
         if (strcmp(value, names[i]) == 0)
             return i;
-    (void)misuse(command, "--%s %s: unknown; known are%s %s%s%s%s%s", option,
-                 value, "", names[0], i > 1 ? ", " : "", i > 1 ? names[1] : "",
-                 i > 2 ? ", " : "", i > 2 ? names[2] : "");
+        used += snprintf(known + used, sizeof known - (size_t)used, "%s%s",
+                         i > 0 ? ", " : "", names[i]);
+    }
+    (void)misuse(command, "--%s %s: unknown; known are %s", option, value,
+                 known);
     return -1;
 }
 
@@ -98,7 +108,6 @@ int options_take(struct options *o, int c, char *const *argv)
     static const char *const filters[] = { "imm", "kf", NULL };
     static const char *const forms[] = { "joseph", "standard", NULL };
     static const char *const holds[] = { "none", "detect", "column", NULL };
-    static const char *const ports[] = { "loop", "lcm", NULL };
     long number = 0;
     int i, status = 0;
 

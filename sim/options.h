@@ -14,7 +14,7 @@ enum hold {                     /* which rows count as arrived */
 };
 
 /* BY_HAND: over LCM, with PEs that somebody else starts. */
-enum port { PORT_NONE, PORT_LOOP, PORT_LCM, PORT_BY_HAND };
+enum port { PORT_NONE, PORT_LOOP, PORT_THREADS, PORT_LCM, PORT_BY_HAND };
 
 struct options {
     const char *command;        /* for messages: "filter"                   */
@@ -76,6 +76,9 @@ struct options {
     "                    (default 60; a PE waits for its host without end)\n" \
     "  --lcm-url URL     LCM address, such as\n" \
     "                    udpm://239.255.76.67:7667?ttl=1\n"
+
+/* "loop", "threads" or "lcm". */
+const char *options_port_name(enum port port);
 
 void options_init(struct options *options, const char *command);
 

@@ -5,14 +5,18 @@
 
 #include "clock.h"
 
+/* PEs that are threads may complain while the host makes progress: the lock
+ * of stderr also guards drawn_us. */
 static const char *name = "";
 static double drawn_us;
 
 void progress_clear(void)
 {
+    flockfile(stderr);
     if (drawn_us > 0)
         fprintf(stderr, "\r\033[K");
     drawn_us = 0;
+    funlockfile(stderr);
 }
 
 void progress_begin(const char *what)
@@ -25,9 +29,13 @@ void progress(long done, long total)
 {
     double now = clock_us();
 
-    if (name[0] == '\0' || now - drawn_us < 1e5 || !isatty(STDERR_FILENO))
+    if (name[0] == '\0')
         return;
-    drawn_us = now;
-    fprintf(stderr, "\r\033[K%s: %ld of %ld", name, done, total);
-    fflush(stderr);
+    flockfile(stderr);
+    if (now - drawn_us >= 1e5 && isatty(STDERR_FILENO)) {
+        drawn_us = now;
+        fprintf(stderr, "\r\033[K%s: %ld of %ld", name, done, total);
+        fflush(stderr);
+    }
+    funlockfile(stderr);
 }

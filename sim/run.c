@@ -46,7 +46,8 @@ int run(struct estimates *e, struct traffic *traffic,
         return 2;                       /* before anybody is started */
     switch (options->port) {
     case PORT_LOOP:
-        return run_loop(e, traffic, model, data, options);
+    case PORT_THREADS:
+        return run_inside(e, traffic, model, data, options);
     case PORT_LCM:
         return run_lcm(e, traffic, model, data, options);
     case PORT_BY_HAND:

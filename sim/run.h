@@ -19,9 +19,9 @@ struct traffic {
  * was estimated before is in *e.  Otherwise returns 0. */
 int run_serial(struct estimates *e, const struct model *model,
                const struct data_file *data, const struct options *options);
-int run_loop(struct estimates *e, struct traffic *traffic,
-             const struct model *model, const struct data_file *data,
-             const struct options *options);
+int run_inside(struct estimates *e, struct traffic *traffic,
+               const struct model *model, const struct data_file *data,
+               const struct options *options);
 int run_lcm(struct estimates *e, struct traffic *traffic,
             const struct model *model, const struct data_file *data,
             const struct options *options);

@@ -1,22 +1,23 @@
 #include "conform.h"
 
+#include <stdatomic.h>
 #include <stdio.h>
 
 #define MAX_LEN 4096
 #define NO_DATA (-1)
 
 const conform_port *port;
-static int failures;
+static atomic_int failures;            /* PEs may be threads */
 
 void conform_fail(const char *file, int line, const char *what, long value)
 {
     fprintf(stderr, "%s:%d: not %s: it is %ld\n", file, line, what, value);
-    failures++;
+    atomic_fetch_add(&failures, 1);
 }
 
 int conform_failures(void)
 {
-    return failures;
+    return atomic_load(&failures);
 }
 
 void conform_fill(unsigned char *msg, int len, unsigned number)
@@ -274,22 +275,22 @@ static void rendezvous(int pe)
         EXPECT(send_number(0, 1, 4, 2, SHORT_US), ==, JL_ETIMEOUT);
         EXPECT(signal_to(0, 1), ==, JL_OK);
         /* now it is in recv */
-        EXPECT(let_pass(0, SHORT_US), ==, JL_ETIMEOUT);
+        EXPECT(let_pass(0, SETTLE_US), ==, JL_ETIMEOUT);
         EXPECT(send_number(0, 1, 4, 3, 0), ==, JL_OK);
         /* we are in send, and the receiver comes and looks */
         EXPECT(send_number(0, 1, 4, 4, LONG_US), ==, JL_OK);
         /* a receiver in wait has not taken anything */
-        EXPECT(let_pass(0, SHORT_US), ==, JL_ETIMEOUT);
+        EXPECT(let_pass(0, SETTLE_US), ==, JL_ETIMEOUT);
         EXPECT(send_number(0, 1, 4, 5, 0), ==, JL_ETIMEOUT);
         EXPECT(send_number(0, 1, 4, 6, LONG_US), ==, JL_OK);
     } else if (pe == 1) {
         jl_chan *from = port->rx(0, 1);
 
-        EXPECT(let_pass(1, 10 * SHORT_US), ==, JL_ETIMEOUT);
+        EXPECT(let_pass(1, SETTLE_US), ==, JL_ETIMEOUT);
         EXPECT(jl_chan_wait(&from, 1, 0), ==, 0);
         EXPECT(await(0, 1), ==, 0);
         EXPECT(recv_number(0, 1, 3, LONG_US), ==, 4);
-        EXPECT(let_pass(1, SHORT_US), ==, JL_ETIMEOUT);
+        EXPECT(let_pass(1, SETTLE_US), ==, JL_ETIMEOUT);
         EXPECT(recv_number(0, 1, 4, 0), ==, 4);
         EXPECT(jl_chan_wait(&from, 1, LONG_US), ==, 0);
         EXPECT(recv_number(0, 1, 6, 0), ==, 4);

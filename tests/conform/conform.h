@@ -13,6 +13,7 @@
 /* Long enough never to pass in a case that succeeds; short enough to wait. */
 #define LONG_US 8000000L
 #define SHORT_US 3000L
+#define SETTLE_US 200000L      /* others have surely got where they wait */
 
 #define CONFORM_PES 5           /* at most */
 

@@ -210,8 +210,10 @@ static void test_filter_parallel_sticky_chain(void **state)
 
     (void)state;
     same_for_all_pes("loop", serial, model, data);
+    same_for_all_pes("threads", serial, model, data);
     same_for_all_pes("lcm", serial, model, data);
     same_on("loop", "4", standard, model, data, "--form", "standard");
+    same_on("threads", "4", standard, model, data, "--form", "standard");
     same_on("lcm", "4", standard, model, data, "--form", "standard");
     assert_true(strcmp(serial, standard) != 0);
     free(serial);
@@ -227,8 +229,10 @@ static void test_filter_parallel_general_chain(void **state)
 
     (void)state;
     same_for_all_pes("loop", serial, EIGHT, data, FLIGHT);
+    same_for_all_pes("threads", serial, EIGHT, data, FLIGHT);
     same_for_all_pes("lcm", serial, EIGHT, data, FLIGHT);
     same_on("loop", "3", all, EIGHT, DATA "sightseeing_1hz.csv", FLIGHT);
+    same_on("threads", "3", all, EIGHT, DATA "sightseeing_1hz.csv", FLIGHT);
     free(serial);
     free(all);
 }
@@ -242,6 +246,8 @@ static void test_filter_parallel_kf(void **state)
 
     (void)state;
     same_for_all_pes("loop", serial, TWO, data, FLIGHT, "--filter", "kf",
+                     "--mode", "1");
+    same_for_all_pes("threads", serial, TWO, data, FLIGHT, "--filter", "kf",
                      "--mode", "1");
     same_for_all_pes("lcm", serial, TWO, data, FLIGHT, "--filter", "kf",
                      "--mode", "1");
@@ -258,6 +264,7 @@ static void test_filter_parallel_irregular_times(void **state)
     (void)state;
     same_on("loop", "1", serial, EIGHT, data, FLIGHT);
     same_on("loop", "8", serial, EIGHT, data, FLIGHT);
+    same_on("threads", "8", serial, EIGHT, data, FLIGHT);
     same_on("lcm", "3", serial, EIGHT, data, FLIGHT);
     same_on("loop", "4", all, EIGHT, DATA "glider_irregular.csv", FLIGHT);
     free(serial);
@@ -274,6 +281,7 @@ static void test_filter_parallel_held_positions(void **state)
     (void)state;
     assert_true(strcmp(detect, none) != 0);
     same_on("loop", "4", detect, EIGHT, data, FLIGHT, "--hold", "detect");
+    same_on("threads", "4", detect, EIGHT, data, FLIGHT, "--hold", "detect");
     same_on("lcm", "4", detect, EIGHT, data, FLIGHT, "--hold", "detect");
     same_on("loop", "4", none, EIGHT, data, FLIGHT, "--hold", "none");
     free(detect);
@@ -285,15 +293,18 @@ static void test_filter_parallel_default_pes(void **state)
 {
     char *serial = filtered(CVCA3);
     char *loop = filtered(CVCA3, "--port", "loop");
+    char *threads = filtered(CVCA3, "--port", "threads");
     char *lcm = filtered(CVCA3, "--port", "lcm", PATIENTLY);
     char *three = filtered(CVCA3, "--pes", "3", PATIENTLY);
 
     (void)state;
     check_same_text(serial, loop);
+    check_same_text(serial, threads);
     check_same_text(serial, lcm);
     check_same_text(serial, three);
     free(serial);
     free(loop);
+    free(threads);
     free(lcm);
     free(three);
     check_nobody_left();
@@ -345,6 +356,7 @@ static void test_filter_runs_are_filtered_on_their_own(void **state)
     assert_int_equal(strncmp(cut, rest, strlen(rest)), 0);
     check_same_text(cut + strlen(rest), strchr(two, '\n') + 1);
     same_on("loop", "2", both, TWO, path);
+    same_on("threads", "2", both, TWO, path);
     same_on("lcm", "2", both, TWO, path);
     free(both);
     free(one);
@@ -639,6 +651,7 @@ static void test_filter_step_that_fails(void **state)
     check_step_fails("huge.csv:4: ", model, data);
     check_step_fails("huge.csv:4: ", model, data, "--form", "standard");
     check_step_fails("huge.csv:4: ", model, data, "--port", "loop");
+    check_step_fails("huge.csv:4: ", model, data, "--port", "threads");
     check_step_fails("huge.csv:4: ", model, data, "--port", "lcm",
                      PATIENTLY);
     check_nobody_left();
@@ -688,7 +701,7 @@ static void test_filter_options_with_wrong_values(void **state)
     refused("--form|sqrt", "filter", CVCA3, "--form", "sqrt");
     refused("--hold|foo|none, detect, column", "filter", CVCA3, "--hold",
             "foo");
-    refused("--port|threads|loop, lcm", "filter", CVCA3, "--port", "threads");
+    refused("--port|udp|loop, threads, lcm", "filter", CVCA3, "--port", "udp");
     refused("--pes|0", "filter", CVCA3, "--port", "loop", "--pes", "0");
     refused("--pes|17|16", "filter", CVCA3, "--port", "loop", "--pes", "17");
     refused("--pes", "filter", CVCA3, "--port", "loop", "--pes", "");
@@ -741,7 +754,7 @@ static void test_filter_files_that_do_not_fit(void **state)
 /* What is wrong with the files is found before anybody is started. */
 static void test_filter_files_that_do_not_fit_in_parallel(void **state)
 {
-    static const char *const ports[] = { "loop", "lcm" };
+    static const char *const ports[] = { "loop", "threads", "lcm" };
     size_t i;
 
     (void)state;

@@ -218,6 +218,12 @@ static void test_sim_over_loop(void **state)
     check_sim("loop", scratch_path("some/folder/loop"));
 }
 
+static void test_sim_over_threads(void **state)
+{
+    (void)state;
+    check_sim("threads", scratch_path("threads"));
+}
+
 /* --- the whole flight ---------------------------------------------------- */
 
 static void test_sim_recognised_positions_pay(void **state)
@@ -324,6 +330,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_sim_over_lcm),
         cmocka_unit_test(test_sim_over_loop),
+        cmocka_unit_test(test_sim_over_threads),
         cmocka_unit_test(test_sim_recognised_positions_pay),
         cmocka_unit_test(test_sim_one_way_only),
         cmocka_unit_test(test_sim_refuses),
