@@ -121,9 +121,11 @@ TEST_FOLDERS := unit golden conform fault program
 TESTING = $(HOST) -Isrc -Itests -I$(BUILD)/golden -DTOP_DIR='"$(CURDIR)"' \
     -DJUMPLINK='"$(abspath $(BUILD)/jumplink$(1))"'
 
+HELP_FROM_fault := tests/conform/conform.c
+
 define tests_of # folder, suffix
 HELP_$(1)$(2) := $$(patsubst %.c,$(BUILD)/obj$(2)/%.o,$$(filter-out \
-    tests/$(1)/test_% tests/$(1)/gen_%,$$(wildcard tests/$(1)/*.c)))
+    tests/$(1)/test_% tests/$(1)/gen_%,$$(wildcard tests/$(1)/*.c) $(HELP_FROM_$(1))))
 TESTS_$(1)$(2) := $$(patsubst tests/$(1)/%.c,$(BUILD)/tests$(2)/%,$$(wildcard \
     tests/$(1)/test_*.c))
 TESTS += $$(TESTS_$(1)$(2))
