@@ -30,7 +30,7 @@ static const int share[PAIR_SETS] = {
 
 long pair_messages(int set)
 {
-    return 1000L * share[set];
+    return PAIR_ALL / 1000 * share[set];
 }
 
 /* Message `number` of a direction: mostly short, at times of several pieces. */
