@@ -53,8 +53,8 @@ typedef struct jl_lcm_config {
 jl_lcm *jl_lcm_open(const jl_lcm_config *config, const char **why);
 
 /* Close: wait up to linger_us until all that was sent is acknowledged, or its
- * receiver has closed too; then stay 12 rto_us to answer peers that did not hear
- * our last word, unless all have closed and nothing was ever lost. */
+ * receiver has closed too; then, if a peer has not acknowledged our last word,
+ * repeat it for 48 rto_us, unless all have closed and nothing was ever lost. */
 void jl_lcm_close(jl_lcm *lcm, long linger_us);
 
 /* Channels to and from another node; valid until jl_lcm_close.  NULL if there

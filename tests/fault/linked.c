@@ -4,7 +4,7 @@
 #include <string.h>
 
 #define ACK_PART 4              /* an acknowledgement waits rto_us / 4      */
-#define QUIET_PARTS 12          /* rto_us to answer repetitions in          */
+#define QUIET_PARTS 48          /* rto_us to repeat the last word in        */
 
 struct end {
     jl_chan chan;               /* first: ops get a jl_chan and cast it     */
@@ -245,6 +245,21 @@ linked *linked_open(const linked_config *config)
     return NULL;
 }
 
+/* Everybody who is there knows that we have closed. */
+static int told(const linked *l)
+{
+    int i;
+
+    for (i = 0; i < l->config.nodes; i++) {
+        const struct peer *p = &l->peers[i];
+
+        if (i != l->config.node && !p->gone
+            && p->link.out_first != p->link.out_end)
+            return 0;
+    }
+    return 1;
+}
+
 static int settled(const linked *l)
 {
     int i;
@@ -273,7 +288,8 @@ void linked_close(linked *l, long linger_us)
     while (!settled(l) && turn(l, since, linger_us) == JL_OK)
         flush(l);
     since = now_of(l);
-    while (turn(l, since, QUIET_PARTS * (long)l->config.rto_us) == JL_OK)
+    while (!told(l)
+           && turn(l, since, QUIET_PARTS * (long)l->config.rto_us) == JL_OK)
         ;
     flush(l);
     free_all(l);

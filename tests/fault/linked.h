@@ -30,7 +30,7 @@ typedef struct linked linked;
 linked *linked_open(const linked_config *config);
 
 /* Close all channels: wait up to linger_us until all that was sent is there or
- * its receiver has gone, answer the others' repetitions for a while, and free
+ * its receiver has gone, repeat the last word for a while, and free
  * everything. */
 void linked_close(linked *l, long linger_us);
 

@@ -25,7 +25,7 @@ const fault_set pair_sets[PAIR_SETS] = {
 
 /* In thousandths of all, for both directions together. */
 static const int share[PAIR_SETS] = {
-    80, 20, 260, 260, 80, 40, 80, 20, 80, 20, 30, 20, 8, 2
+    80, 8, 297, 260, 80, 40, 80, 8, 80, 8, 30, 20, 8, 1
 };
 
 long pair_messages(int set)

@@ -42,7 +42,7 @@ static jl_u32 now(void *carrier)
 }
 
 static const linked_port threads_port = {
-    "port threads", 1000, make, end, tx, rx, run, now
+    "port threads", 500, make, end, tx, rx, run, now
 };
 
 static void test_fault_threads_million(void **state)
