@@ -10,6 +10,7 @@ sim       liblcm-dev                 lcm/lcm.h
 sim       libjansson-dev             jansson.h
 sim       gnuplot-nox                gnuplot
 test      libcmocka-dev              cmocka.h
+test      nftables                   /usr/sbin/nft
 check     binutils                   objdump
 check     g++                        g++
 check     clang                      clang++
