@@ -12,7 +12,7 @@ static void live_in_pair(int pair, int which, const fault_set *set, long n)
 {
     struct crew_node *node = &crew_nodes[2 * pair + which];
     int other = 1 - which;
-    char run[16];
+    char run[32];
     jl_lcm *lcm;
 
     snprintf(run, sizeof run, "pair%d", pair);

@@ -33,7 +33,7 @@ static int run(int n, conform_body body)
 {
     int which = (int)(now_testing - conform_cases), i;
     pid_t child[CONFORM_PES];
-    char name[17];
+    char name[32];
 
     snprintf(name, sizeof name, "case%d_%d", which, (int)(set - pair_sets));
     for (i = 0; i < n; i++) {
@@ -90,7 +90,7 @@ static void test_fault_lcm_gives_serial_bits(void **state)
 {
     pid_t child[PAIR_SETS][CREW_PES + 1];
     struct crew_node *nodes = crew_nodes;
-    char name[16];
+    char name[32];
     int s;
 
     (void)state;

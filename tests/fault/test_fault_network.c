@@ -44,7 +44,7 @@ static void test_fault_network_loses(void **state)
 {
     static const int percent[] = { 10, 30 };
     pid_t child[CREW_PES + 1];
-    char name[16];
+    char name[32];
     int i, sticky;
 
     (void)state;
