@@ -8,6 +8,8 @@
 #   make check      standards, layers, symbols, cross-builds
 #   make sanitize   every test under AddressSanitizer and UBSan
 #   make tsan       the tests of PEs on threads, under ThreadSanitizer
+#   make fuzz       libFuzzer over the decoders, SECONDS=60 for each
+#   make bench      what messages and steps cost: tables, CSV, plots
 #   make deps       install the packages that sim and test need
 #   make install    libraries, headers, program to $(DESTDIR)$(PREFIX)
 #   make clean
@@ -25,37 +27,52 @@ WARN := -Wall -Wextra -Wshadow -Wconversion -Wundef -Wstrict-prototypes \
 EXACT := -ffp-contract=off -fno-math-errno
 CORE := -std=c89 -pedantic $(WARN) -Wdeclaration-after-statement $(EXACT) \
     -Iinclude -Isrc
-HOST := -std=c11 -D_GNU_SOURCE -pthread $(WARN) $(EXACT) -Iinclude -Iport -Isim
+HOST := -std=c11 -D_GNU_SOURCE -pthread $(WARN) $(EXACT) -Iinclude -Iport -Isim \
+    -I$(BUILD)/gen
 FLOAT := -DJL_REAL_FLOAT=1
 
 INCLUDE := \#include
 have = $(shell echo '$(INCLUDE) <$(1)>' | $(CC) -E - >/dev/null 2>&1 && echo yes)
 HAVE_LCM := $(call have,lcm/lcm.h)
 HAVE_JANSSON := $(call have,jansson.h)
-PROGRAMS := $(if $(and $(HAVE_LCM),$(HAVE_JANSSON),$(wildcard sim/main.c)),$(BUILD)/jumplink $(BUILD)/jumplink_f32)
+HAVE_LCM_GEN := $(shell command -v lcm-gen 2>/dev/null)
+PROGRAMS := $(if $(and $(HAVE_LCM),$(HAVE_JANSSON),$(HAVE_LCM_GEN),$(wildcard sim/main.c)),$(BUILD)/jumplink $(BUILD)/jumplink_f32)
 
 CORE_SRC := $(wildcard src/*/*.c)
-PORT_SRC := $(wildcard port/loop/*.c port/threads/*.c) $(if $(HAVE_LCM),$(wildcard port/lcm/*.c))
+PORT_SRC := $(wildcard port/loop/*.c port/threads/*.c port/skel/*.c) $(if $(HAVE_LCM),$(wildcard port/lcm/*.c))
 SIM_SRC := $(wildcard sim/*.c)
+GEN_SRC := $(patsubst sim/lcm/%.lcm,$(BUILD)/gen/jumplink_%.c,$(wildcard sim/lcm/*.lcm))
 LIBS := -Wl,--as-needed -llcm -ljansson -lm
 
-.PHONY: all lib deps sim test golden run-tests check sanitize tsan run-tsan \
-    install clean force
+.PHONY: all lib deps sim test generated golden run-tests check sanitize tsan \
+    run-tsan fuzz bench run-bench install clean force
 .DELETE_ON_ERROR:
 .SECONDARY:
 
 all: lib $(BUILD)/libports.a $(PROGRAMS)
 	@$(if $(HAVE_LCM),:,echo "skipped: port lcm and the program (no lcm/lcm.h; make deps installs it)")
+	@$(if $(HAVE_LCM_GEN),:,echo "skipped: the program (no lcm-gen; make deps installs it)")
 	@$(if $(HAVE_JANSSON),:,echo "skipped: the program (no jansson.h; make deps installs it)")
 lib: $(BUILD)/libjumplink.a $(BUILD)/libjumplink_f32.a
+
+# --- typed messages ------------------------------------------------------
+
+# Code that lcm-gen makes of sim/lcm is not ours to warn about.
+GEN_OBJ := $(GEN_SRC:$(BUILD)/%.c=$(BUILD)/obj/%.o)
+generated: $(GEN_SRC)
+$(BUILD)/gen/jumplink_%.c $(BUILD)/gen/jumplink_%.h: sim/lcm/%.lcm
+	@mkdir -p $(@D); echo '  $@'; lcm-gen -c --c-cpath $(@D) --c-hpath $(@D) $<
+$(BUILD)/obj/gen/%.o: $(BUILD)/gen/%.c $(BUILD)/flags
+	$(call compile,-std=c99 -w)
+$(SIM_SRC:%.c=$(BUILD)/obj/%.o) $(SIM_SRC:%.c=$(BUILD)/obj_f32/%.o): | generated
 
 # --- libraries -----------------------------------------------------------
 
 $(BUILD)/libjumplink.a: $(CORE_SRC:%.c=$(BUILD)/obj/%.o)
 $(BUILD)/libjumplink_f32.a: $(CORE_SRC:%.c=$(BUILD)/obj_f32/%.o)
 $(BUILD)/libports.a: $(PORT_SRC:%.c=$(BUILD)/obj/%.o)
-$(BUILD)/libsim.a: $(filter-out %/main.o,$(SIM_SRC:%.c=$(BUILD)/obj/%.o))
-$(BUILD)/libsim_f32.a: $(filter-out %/main.o,$(SIM_SRC:%.c=$(BUILD)/obj_f32/%.o))
+$(BUILD)/libsim.a: $(filter-out %/main.o,$(SIM_SRC:%.c=$(BUILD)/obj/%.o)) $(GEN_OBJ)
+$(BUILD)/libsim_f32.a: $(filter-out %/main.o,$(SIM_SRC:%.c=$(BUILD)/obj_f32/%.o)) $(GEN_OBJ)
 $(BUILD)/%.a: $(BUILD)/sources
 	@rm -f $@; echo '  $@'; $(AR) rcs $@ $(filter %.o,$^)
 
@@ -72,7 +89,7 @@ $(BUILD)/obj_f32/%.o: %.c $(BUILD)/flags
 # Two notes that change only when what they say changes, so that other flags
 # or a source that is gone also rebuild what they concern.
 $(BUILD)/flags: NOTE = $(CC) $(CORE) $(HOST) $(CFLAGS)
-$(BUILD)/sources: NOTE = $(CORE_SRC) $(PORT_SRC) $(SIM_SRC)
+$(BUILD)/sources: NOTE = $(CORE_SRC) $(PORT_SRC) $(SIM_SRC) $(GEN_SRC)
 $(BUILD)/flags $(BUILD)/sources: force
 	@mkdir -p $(@D)
 	@echo '$(NOTE)' | cmp -s - $@ || echo '$(NOTE)' >$@
@@ -109,15 +126,15 @@ tsan: deps
 
 check: deps
 	@CC='$(CC)' sh tests/check/deps.sh check
-	$(AGAIN) golden
-	@MAKE='$(MAKE)' BUILD='$(BUILD)/check' GOLDEN='$(BUILD)/golden' sh tests/check/check_all.sh
+	$(AGAIN) golden generated
+	@MAKE='$(MAKE)' BUILD='$(BUILD)/check' GOLDEN='$(BUILD)/golden' GEN='$(BUILD)/gen' sh tests/check/check_all.sh
 
 # --- tests ---------------------------------------------------------------
 
 # tests/<folder>/test_x.c becomes $(BUILD)/tests/test_x and
 # $(BUILD)/tests_f32/test_x; other .c files help the tests of their folder.
 # A test knows the checkout (TOP_DIR) and its program (JUMPLINK) by macros.
-TEST_FOLDERS := unit golden conform fault program
+TEST_FOLDERS := unit golden conform fault program fuzz
 TESTING = $(HOST) -Isrc -Itests -I$(BUILD)/golden -DTOP_DIR='"$(CURDIR)"' \
     -DJUMPLINK='"$(abspath $(BUILD)/jumplink$(1))"'
 
@@ -135,9 +152,9 @@ $$(TESTS_$(1)$(2)): $(BUILD)/tests$(2)/%: $(BUILD)/obj$(2)/tests/$(1)/%.o \
 endef
 $(foreach f,$(TEST_FOLDERS),$(eval $(call tests_of,$f,))$(eval $(call tests_of,$f,_f32)))
 
-$(BUILD)/obj/tests/%.o: tests/%.c $(BUILD)/flags | golden
+$(BUILD)/obj/tests/%.o: tests/%.c $(BUILD)/flags | golden generated
 	$(call compile,$(call TESTING,))
-$(BUILD)/obj_f32/tests/%.o: tests/%.c $(BUILD)/flags | golden
+$(BUILD)/obj_f32/tests/%.o: tests/%.c $(BUILD)/flags | golden generated
 	$(call compile,$(call TESTING,_f32) $(FLOAT))
 
 # The reference cases as C tables, so that the same test bodies run on a board.
@@ -156,6 +173,52 @@ run-tests: $(TESTS) $(PROGRAMS) lib
 # No fork: what ThreadSanitizer watches are threads.
 run-tsan: $(foreach t,conform_loop conform_threads par_loop par_threads fault_threads,$(BUILD)/tests/test_$(t) $(BUILD)/tests_f32/test_$(t))
 	@sh tests/check/run_tests.sh $^
+
+# --- fuzzing -------------------------------------------------------------
+
+# tests/fuzz/fuzz_x.c becomes $(BUILD)/fuzz/x, whose function fuzz_x has the
+# name that libFuzzer calls.  Small frames: a long message is soon made.  What
+# it keeps is in $(BUILD)/fuzz/corpus, what breaks a promise in found/.
+SECONDS ?= 60
+FUZZ_TARGETS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
+FUZZ_SRC := tests/fuzz/fuzz.c $(CORE_SRC) $(wildcard port/loop/*.c)
+FUZZING := $(HOST) -Isrc -Itests -O1 -g -fno-omit-frame-pointer \
+    -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
+    -DJL_FRAME_MAX=96 -include assert.h -DJL_ASSERT=assert
+
+fuzz:
+	@CC='$(CC)' sh tests/check/deps.sh fuzz
+	$(AGAIN) $(FUZZ_TARGETS:%=run-fuzz-%)
+
+run-fuzz-%: $(BUILD)/fuzz/% $(BUILD)/gen_seeds
+	@cd $(BUILD)/fuzz && mkdir -p found corpus/$* seeds/$*
+	@$(BUILD)/gen_seeds $(BUILD)/fuzz/seeds/$* <tests/fuzz/corpus/$*.hex
+	$(BUILD)/fuzz/$* -max_total_time=$(SECONDS) -max_len=1024 -verbosity=0 \
+	    -print_final_stats=1 -artifact_prefix=$(BUILD)/fuzz/found/$*- \
+	    $(BUILD)/fuzz/corpus/$* $(BUILD)/fuzz/seeds/$*
+
+$(BUILD)/fuzz/%: tests/fuzz/fuzz_%.c $(FUZZ_SRC) $(wildcard include/*/*.h src/*/*.h tests/fuzz/*.h)
+	@mkdir -p $(@D); echo '  $@'; \
+	    clang $(FUZZING) -Dfuzz_$*=LLVMFuzzerTestOneInput $(filter %.c,$^) -lm -o $@
+$(BUILD)/gen_seeds: tests/fuzz/gen_seeds.c tests/fuzz/fuzz.c $(BUILD)/libjumplink.a
+	@echo '  $@'; $(CC) $(HOST) $(CFLAGS) $^ -o $@
+
+# --- figures -------------------------------------------------------------
+
+# tests/bench/bench_x.c with a main becomes $(BUILD)/bench/bench_x.
+BENCHES := $(patsubst %,$(BUILD)/bench/bench_%,channels step break_even)
+$(BENCHES): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o \
+    $(patsubst %,$(BUILD)/obj/tests/bench/bench_%.o,samples nodes filter) \
+    $(BUILD)/libsim.a $(BUILD)/libports.a $(BUILD)/libjumplink.a
+	@mkdir -p $(@D); echo '  $@'; $(CC) $(CFLAGS) -pthread $^ $(LIBS) -o $@
+
+bench: deps
+	$(AGAIN) run-bench
+
+run-bench: $(BENCHES)
+	@for b in $(BENCHES); do $$b $(BUILD)/bench || exit 1; done
+	@cd $(BUILD)/bench && gnuplot '$(CURDIR)/tests/bench/latency.gp' '$(CURDIR)/tests/bench/break_even.gp'
+	@echo 'CSV and plots: $(BUILD)/bench'
 
 # --- the rest ------------------------------------------------------------
 

@@ -35,6 +35,7 @@
 #include "jumplink/chan.h"
 #include "jumplink/wire.h"
 #include "jumplink/link.h"
+#include "jumplink/plan.h"
 #include "jumplink/par.h"
 
 #endif

@@ -19,6 +19,8 @@ static const char help[] =
     "                    (default with --pes), or threads, or threads that\n"
     "                    take turns\n"
     PORT_HELP
+    "  --run NAME        name of what is published there, JL.NAME.estimate\n"
+    "                    and JL.NAME.measurement (default jumplink)\n"
     HELP_HELP;
 
 int cmd_filter(int argc, char **argv)
@@ -32,12 +34,12 @@ int cmd_filter(int argc, char **argv)
         return status;
     if (argc - optind != 2)
         return misuse("filter", "needs MODEL.json and DATA.csv");
-    if (options.run != NULL)
-        return misuse("filter", "--run goes with jumplink pe and host");
     if (options.port == PORT_NONE && options.pes > 0)
         options.port = PORT_LCM;
     if (options.port != PORT_LCM && options.lcm_url != NULL)
         return misuse("filter", "--lcm-url needs --port lcm");
+    if (options.run != NULL && options.lcm_url == NULL)
+        return misuse("filter", "--run names what is published on --lcm-url");
     if (options.pes == 0)
         options.pes = 4;
     return run_file(argv[optind], argv[optind + 1], &options);

@@ -11,11 +11,12 @@ static const char help[] =
     "One PE of a run on several machines: the same model, filter and\n"
     "form on all PEs and on the host (jumplink host), which must be\n"
     "started too, in any order.  Ends when the host ends the run, and\n"
-    "prints what it sent; if the host dies, end it by hand.\n\n"
+    "prints what it sent; or, with a word, when the host or another PE\n"
+    "has been silent for the timeout.\n\n"
     "  --pe I            which PE this is, from 0; PE 0 talks to the host\n"
     "  --pes P           how many there are\n"
     "  --model MODEL.json  the model\n"
-    "  --timeout S       longest wait for another PE in a step (default 2)\n"
+    "  --timeout S       longest wait for a word from the others (default 2)\n"
     RUN_HELP
     COMMON_HELP
     HELP_HELP;
@@ -24,7 +25,7 @@ static int serve(int pe, const struct model *model,
                  const struct options *options)
 {
     struct lcm_node node;
-    struct traffic traffic = { 0, 0, 0 };
+    struct traffic traffic = { 0 };
     int status;
 
     if (lcm_node_open(&node, pe, options->lcm_url, options->run, model,
@@ -37,8 +38,9 @@ static int serve(int pe, const struct model *model,
     lcm_node_close(&node, status == JL_OK);
     if (status != JL_OK)
         return 1;
-    printf("pe %d of %d: %lu messages, %lu octets, %lu sent again\n", pe,
-           options->pes, traffic.messages, traffic.octets, traffic.resent);
+    printf("pe %d of %d: %lu messages, %lu octets, %lu sent again, %lu "
+           "refused\n", pe, options->pes, traffic.messages, traffic.octets,
+           traffic.resent, traffic.refused);
     return 0;
 }
 

@@ -1,10 +1,8 @@
 /* jumplink sim: recorded flights through filters on PEs; table, CSV, plots. */
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "command.h"
 #include "complain.h"
@@ -12,11 +10,13 @@
 #include "out_file.h"
 #include "progress.h"
 #include "run.h"
+#include "sim_live.h"
 
 #define MODELS_MAX 8
 
 static const char help[] =
     "usage: jumplink sim [OPTIONS]\n"
+    "       jumplink sim --input lcm --model FILE --lcm-url URL [OPTIONS]\n"
     "Filters a recorded flight on PEs that are processes talking over\n"
     "LCM, once with every position taken as fresh and once with held\n"
     "positions recognised, for each model; compares with the serial\n"
@@ -37,40 +37,15 @@ static const char help[] =
     "                    east_m,north_m)\n"
     "  --time NAME       column of the time (default t_s, else k)\n"
     PORT_HELP
+    "  --run NAME        name of what is published there, JL.NAME.estimate\n"
+    "                    and JL.NAME.measurement (default jumplink)\n"
+    "  --input lcm       measurements off the network instead: messages of\n"
+    "                    sim/lcm/measurement.lcm on channel\n"
+    "                    JL.NAME.measurement from any LCM program; lost\n"
+    "                    ones are predicted through, and counted\n"
+    "  --idle S          ... until none came for so long (default 5); the\n"
+    "                    longest wait for the first is --start (default 60)\n"
     HELP_HELP;
-
-static int is_folder(const char *path)
-{
-    int error = errno;
-    struct stat is;
-
-    if (stat(path, &is) == 0) {
-        errno = ENOTDIR;
-        return S_ISDIR(is.st_mode);
-    }
-    errno = error;
-    return 0;
-}
-
-/* mkdir -p */
-static int make_folder(const char *path)
-{
-    char *copy = strdup(path), *p;
-    int status = 0;
-
-    for (p = copy; status == 0 && p != NULL; ) {
-        p = strchr(p + 1, '/');
-        if (p != NULL)
-            *p = '\0';
-        if (mkdir(copy, 0777) != 0 && !is_folder(copy))
-            status = complain(copy, 0, NULL, "cannot create the folder: %s",
-                              strerror(errno));
-        if (p != NULL)
-            *p = '/';
-    }
-    free(copy);
-    return status;
-}
 
 /* One model, one way with held positions: serial for comparison, then
  * parallel. */
@@ -96,7 +71,9 @@ static int one_run(struct flight_run *r, const struct model *model,
         status = run(&r->e, &r->traffic, model, data, options);
         progress_begin(NULL);
     }
+    r->partial = status != 0;
     r->same = status == 0 && estimates_same(&serial, &r->e);
+    r->apart = status == 0 ? estimates_apart(&r->e, &serial) : (double)NAN;
     (void)estimates_times(&serial, &r->serial_us, &p99);
     estimates_close(&serial);
     return status;
@@ -120,7 +97,10 @@ static int all_runs(struct flight_report *report, struct model *models,
                 : h == 1 && data->arrived != NULL ? HOLD_COLUMN : both[h];
             flight_run_name(r, &models[i], options->hold);
             status = one_run(r, &models[i], data, options);
-            report->count++;
+            if (status == 0 || r->e.done > 0)
+                report->count++;
+            else
+                estimates_close(&r->e);
         }
     return status;
 }
@@ -182,14 +162,18 @@ static int sim(const char *data_path, const char *const *paths, int count,
                 status = 2;
         }
     if (status == 0)
-        status = make_folder(options->out) != 0 ? 1 : 0;
+        status = out_folder(options->out) != 0 ? 1 : 0;
     if (status == 0 && flight_report_open(&report, &data, options,
                                           2 * count) != 0)
         status = 1;
     else if (status == 0) {
+        int written = 0;
+
         status = all_runs(&report, models, count, options);
+        if (report.count > 0)
+            written = flight_report_write(&report, options->out);
         if (status == 0)
-            status = flight_report_write(&report, options->out);
+            status = written;
         flight_report_close(&report);
     }
     for (i = 0; i < read; i++)
@@ -198,20 +182,49 @@ static int sim(const char *data_path, const char *const *paths, int count,
     return status;
 }
 
+/* Measurements off the network: one model, and no file. */
+static int live(const char *data, const char *const *models, int count,
+                struct options *options, long idle_us)
+{
+    if (count != 1 || options->lcm_url == NULL)
+        return misuse("sim", "--input lcm needs one --model, and --lcm-url");
+    if (data != NULL || options->z != NULL || options->time != NULL)
+        return misuse("sim", "--data, --z and --time are not for --input lcm");
+    return sim_live(models[0], options, idle_us);
+}
+
+static int recorded(const char *data, const char *const *models, int count,
+                    struct options *options, long idle_us)
+{
+    if (idle_us > 0)
+        return misuse("sim", "--idle goes with --input lcm");
+    if (options->port != PORT_LCM && options->lcm_url != NULL)
+        return misuse("sim", "--lcm-url needs --port lcm");
+    if (options->run != NULL && options->lcm_url == NULL)
+        return misuse("sim", "--run names what is published on --lcm-url");
+    if (data == NULL)
+        data = "sim/data/carrier_held_1hz.csv";
+    return sim(data, models, count == 0 ? 2 : count, options);
+}
+
 int cmd_sim(int argc, char **argv)
 {
     static const struct option known[] = {
         { "data", required_argument, NULL, 'd' },
         { "model", required_argument, NULL, 'm' },
+        { "input", required_argument, NULL, 'i' },
+        { "idle", required_argument, NULL, 'w' },
         COMMON_OPTIONS, { 0 }
     };
-    const char *data = "sim/data/carrier_held_1hz.csv";
+    const char *data = NULL;
     const char *models[MODELS_MAX] = { "sim/data/two_modes.json",
                                        "sim/data/eight_modes.json" };
     struct options options;
-    int c, count = 0, status = 0;
+    int c, count = 0, off_network = 0, status = 0;
+    long idle_us = 0;
 
     options_init(&options, "sim");
+    options.start_us = 0;               /* the default is not known yet */
     options.port = PORT_LCM;
     options.pes = 4;
     options.out = "build/sim";
@@ -222,6 +235,12 @@ int cmd_sim(int argc, char **argv)
         }
         if (c == 'd')
             data = optarg;
+        else if (c == 'i' && strcmp(optarg, "lcm") == 0)
+            off_network = 1;
+        else if (c == 'i')
+            return misuse("sim", "--input %s: only lcm is known", optarg);
+        else if (c == 'w')
+            status = option_seconds(&idle_us, "sim", "idle", optarg);
         else if (c == 'm' && count < MODELS_MAX)
             models[count++] = optarg;
         else if (c == 'm')
@@ -233,9 +252,9 @@ int cmd_sim(int argc, char **argv)
     }
     if (optind < argc)
         return misuse("sim", "unexpected '%s'", argv[optind]);
-    if (options.run != NULL)
-        return misuse("sim", "--run goes with jumplink pe and host");
-    if (options.port != PORT_LCM && options.lcm_url != NULL)
-        return misuse("sim", "--lcm-url needs --port lcm");
-    return sim(data, models, count == 0 ? 2 : count, &options);
+    if (options.start_us == 0)
+        options.start_us = off_network ? 60000000 : 10000000;
+    return off_network
+        ? live(data, models, count, &options, idle_us > 0 ? idle_us : 5000000)
+        : recorded(data, models, count, &options, idle_us);
 }

@@ -3,42 +3,63 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "complain.h"
+#include "out_file.h"
 
-/* All NaNs have the same bits, so that files and comparisons agree. */
-static jl_real *nans(long count)
+/* From count to more numbers, the new ones NaN.  All NaNs have the same bits,
+ * so that files and comparisons agree. */
+static int stretch(jl_real **v, long count, long more)
 {
-    jl_real *v = malloc((size_t)count * sizeof *v);
-    long i;
+    jl_real *larger = reallocarray(*v, (size_t)more, sizeof *larger);
 
-    for (i = 0; v != NULL && i < count; i++)
-        v[i] = (jl_real)NAN;
-    return v;
+    if (larger == NULL)
+        return -1;
+    for (*v = larger; count < more; count++)
+        larger[count] = (jl_real)NAN;
+    return 0;
+}
+
+static int make_room(struct estimates *e, long rows)
+{
+    long had = e->room, n = e->n, M = e->M;
+    double *us;
+
+    if (stretch(&e->x, had * n, rows * n) != 0
+        || stretch(&e->P, had * n * n, rows * n * n) != 0
+        || stretch(&e->mu, had * M, rows * M) != 0
+        || stretch(&e->loglik, had, rows) != 0)
+        return -1;
+    us = reallocarray(e->us, (size_t)rows, sizeof *us);
+    if (us == NULL)
+        return -1;
+    for (e->us = us; had < rows; had++)
+        us[had] = (double)NAN;
+    e->room = rows;
+    return 0;
+}
+
+int estimates_grow(struct estimates *e, long rows)
+{
+    if (rows > e->room && make_room(e, rows > 2 * e->room ? rows
+                                                          : 2 * e->room) != 0)
+        return -1;
+    if (rows > e->rows)
+        e->rows = rows;
+    return 0;
 }
 
 int estimates_open(struct estimates *e, const struct data_file *data,
                    const struct model *model)
 {
-    long i;
-
     memset(e, 0, sizeof *e);
-    e->rows = data->rows;
     e->n = model->n;
     e->M = model->M;
-    e->x = nans(e->rows * e->n);
-    e->P = nans(e->rows * e->n * e->n);
-    e->mu = nans(e->rows * e->M);
-    e->loglik = nans(e->rows);
-    e->us = malloc((size_t)e->rows * sizeof *e->us);
-    if (e->x == NULL || e->P == NULL || e->mu == NULL || e->loglik == NULL
-        || e->us == NULL) {
-        estimates_close(e);
-        return complain(data->path, 0, NULL, "no memory for its estimates");
-    }
-    for (i = 0; i < e->rows; i++)
-        e->us[i] = (double)NAN;
-    return 0;
+    if (estimates_grow(e, data->rows) == 0)
+        return 0;
+    estimates_close(e);
+    return complain(data->path, 0, NULL, "no memory for its estimates");
 }
 
 void estimates_close(struct estimates *e)
@@ -62,6 +83,7 @@ void estimates_note(struct estimates *e, long row, const jl_real *x,
     memcpy(e->mu + row * M, mu, (size_t)M * sizeof *mu);
     e->loglik[row] = loglik;
     e->us[row] = us;
+    e->done = row + 1;
 }
 
 static int same(const jl_real *a, const jl_real *b, long count)
@@ -78,6 +100,26 @@ int estimates_same(const struct estimates *a, const struct estimates *b)
         && same(a->P, b->P, rows * a->n * a->n)
         && same(a->mu, b->mu, rows * a->M)
         && same(a->loglik, b->loglik, rows);
+}
+
+double estimates_apart(const struct estimates *a, const struct estimates *b)
+{
+    double most = 0;
+    long row;
+    int i, n = b->n;
+
+    for (row = 0; row < b->rows; row++)
+        for (i = 0; i < n; i++) {
+            double x = (double)a->x[row * n + i], y = (double)b->x[row * n + i];
+            double apart = fabs(x - y)
+                / sqrt((double)b->P[(row * n + i) * n + i]);
+
+            if (isnan(x) != isnan(y))
+                return (double)NAN;
+            if (apart > most)
+                most = apart;
+        }
+    return most;
 }
 
 static int ascending(const void *a, const void *b)
@@ -115,10 +157,10 @@ static void put(FILE *out, jl_real v)
 }
 
 void estimates_write(const struct estimates *e, const struct data_file *data,
-                     FILE *out)
+                     int partial, FILE *out)
 {
     int n = e->n, a, b;
-    long row;
+    long row, rows = partial ? e->done : e->rows;
 
     fprintf(out, "%s%s", data->run != NULL ? "run," : "", data->time_name);
     for (a = 0; a < n; a++)
@@ -129,7 +171,7 @@ void estimates_write(const struct estimates *e, const struct data_file *data,
     for (a = 0; a < e->M; a++)
         fprintf(out, ",mu%d", a);
     fputs(",loglik\n", out);
-    for (row = 0; row < e->rows; row++) {
+    for (row = 0; row < rows; row++) {
         if (data->run != NULL)
             fprintf(out, "%ld,", data->run[row]);
         fputs(data->time_text[row], out);
@@ -143,4 +185,33 @@ void estimates_write(const struct estimates *e, const struct data_file *data,
         put(out, e->loglik[row]);
         fputc('\n', out);
     }
+    if (partial)
+        fprintf(out, "# partial: %ld of %ld rows\n", rows, e->rows);
+}
+
+int estimates_save_partial(const struct estimates *e,
+                           const struct data_file *data, const char *path)
+{
+    const char *to = path != NULL ? path : "-";
+    struct out_file out;
+    struct stat is;
+    char *name;
+    int status, beside;
+
+    if (e->done == 0)
+        return 0;
+    beside = strcmp(to, "-") != 0 && (stat(to, &is) != 0
+                                      || S_ISREG(is.st_mode));
+    if (asprintf(&name, "%s%s", to, beside ? ".partial" : "") < 0)
+        return complain(to, 0, NULL, "no memory");
+    status = out_open(&out, name);
+    if (status == 0) {
+        estimates_write(e, data, 1, out.stream);
+        status = out_close(&out, 1);
+    }
+    if (status == 0)
+        complain(beside ? name : "output", 0, NULL,
+                 "partial: the first %ld of %ld rows", e->done, e->rows);
+    free(name);
+    return status;
 }

@@ -8,7 +8,8 @@
 #include "model_file.h"
 
 struct estimates {
-    long rows;
+    long rows, room;            /* of rows there is memory for `room`       */
+    long done;                  /* behind the last with an estimate         */
     int n, M;
     jl_real *x;                 /* [rows,n]; NaN in rows without estimate   */
     jl_real *P;                 /* [rows,n,n]                               */
@@ -21,6 +22,9 @@ struct estimates {
 /* Returns 0, or -1 after a message if there is no memory. */
 int estimates_open(struct estimates *e, const struct data_file *data,
                    const struct model *model);
+/* Have at least this many rows, the new ones NaN, for a record that grows.
+ * Returns 0, or -1 if there is no memory. */
+int estimates_grow(struct estimates *e, long rows);
 void estimates_close(struct estimates *e);
 
 /* Take down a row: x [n], P [n,n], mu [M], loglik, and the time it took. */
@@ -31,12 +35,24 @@ void estimates_note(struct estimates *e, long row, const jl_real *x,
 /* 1 if all numbers of both have the same bits (times apart). */
 int estimates_same(const struct estimates *a, const struct estimates *b);
 
+/* The largest difference of a state in its sigma, sqrt(P) of b; NaN where only
+ * one of them has an estimate. */
+double estimates_apart(const struct estimates *a, const struct estimates *b);
+
 /* Median and 99th percentile of the time per step; number of steps. */
 long estimates_times(const struct estimates *e, double *median_us,
                      double *p99_us);
 
-/* As CSV: time (and run), x, P upper triangle, mu, loglik. */
+/* As CSV: time (and run), x, P upper triangle, mu, loglik; all rows, or, when
+ * `partial`, those that were done and a last line that says so. */
 void estimates_write(const struct estimates *e, const struct data_file *data,
-                     FILE *out);
+                     int partial, FILE *out);
+
+/* What a run that failed has done so far, to PATH.partial (or standard output,
+ * if path is NULL), and a word on standard error; nothing if it has done
+ * nothing.  What is at path stays as it is.  Returns 0, or -1 after a
+ * message. */
+int estimates_save_partial(const struct estimates *e,
+                           const struct data_file *data, const char *path);
 
 #endif

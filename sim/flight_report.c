@@ -112,10 +112,14 @@ static int write_estimates(const struct flight_report *r,
                            const struct flight_run *run, const char *folder)
 {
     struct out_file out;
+    char path[4096];
 
-    if (open_in(&out, folder, run->name, ".csv") != 0)
+    snprintf(path, sizeof path, "%s/%s.csv", folder, run->name);
+    if (run->partial)
+        return estimates_save_partial(&run->e, r->data, path);
+    if (out_open(&out, path) != 0)
         return -1;
-    estimates_write(&run->e, r->data, out.stream);
+    estimates_write(&run->e, r->data, 0, out.stream);
     return out_close(&out, 1);
 }
 
@@ -155,10 +159,12 @@ static void print_table(const struct flight_report *r, FILE *out)
 {
     int i;
 
-    fprintf(out, "%s: %ld rows, %d PEs over %s, %s, %s\n", r->data->path,
-            r->data->rows, r->options->pes,
+    fprintf(out, "%s: %ld rows, %d PEs over %s, %s%s, %s, %s\n",
+            r->data->path, r->data->rows, r->options->pes,
             r->options->port == PORT_LCM ? "LCM"
                 : options_port_name(r->options->port),
+            options_topology(r->options),
+            r->options->exchange == JL_EXCHANGE_REDUCE ? ", all-reduce" : "",
             r->options->form == &jl_kf_joseph ? "Joseph" : "standard",
             JL_REAL_FLOAT ? "float" : "double");
     fprintf(out, HEAD, "", "held", "velocity", "", "step, us", "", "serial",
@@ -169,11 +175,15 @@ static void print_table(const struct flight_report *r, FILE *out)
         const struct flight_run *run = &r->runs[i];
         double median, p99;
         long steps = estimates_times(&run->e, &median, &p99);
+        char same[40];
 
+        snprintf(same, sizeof same, run->same ? "yes" : "NO, %.1e sigma",
+                 run->apart);
         fprintf(out, "%-12s %-10s %8.2f %6ld %8.1f %8.1f %7.1f %8lu %6lu "
                 "%s\n", run->model, run->positions, rms_error(run, r->data),
                 steps, median, p99, run->serial_us, run->traffic.messages,
-                run->traffic.resent, run->same ? "yes" : "NO");
+                run->traffic.resent,
+                run->partial ? "(partial)" : same);
     }
 }
 
@@ -182,16 +192,18 @@ static void print_csv(const struct flight_report *r, FILE *out)
     int i;
 
     fputs("model,positions,velocity_rms_mps,steps,step_median_us,step_p99_us,"
-          "serial_median_us,messages,octets,resent,same_bits\n", out);
+          "serial_median_us,messages,octets,resent,same_bits,apart_sigma,"
+          "partial\n", out);
     for (i = 0; i < r->count; i++) {
         const struct flight_run *run = &r->runs[i];
         double median, p99;
         long steps = estimates_times(&run->e, &median, &p99);
 
-        fprintf(out, "%s,%s,%.6g,%ld,%.6g,%.6g,%.6g,%lu,%lu,%lu,%d\n",
+        fprintf(out, "%s,%s,%.6g,%ld,%.6g,%.6g,%.6g,%lu,%lu,%lu,%d,%.3g,%d\n",
                 run->model, run->positions, rms_error(run, r->data), steps,
                 median, p99, run->serial_us, run->traffic.messages,
-                run->traffic.octets, run->traffic.resent, run->same);
+                run->traffic.octets, run->traffic.resent, run->same, run->apart,
+                run->partial);
     }
 }
 
@@ -285,8 +297,10 @@ int flight_report_write(const struct flight_report *r, const char *folder)
 {
     int i, same, bad = 0;
 
-    for (i = 0; i < r->count; i++)
+    for (i = 0; i < r->count; i++) {
+        bad |= r->runs[i].partial;
         bad |= write_estimates(r, &r->runs[i], folder) != 0;
+    }
     bad |= write_track(r, folder) != 0;
     bad |= write_tables(r, folder) != 0;
     for (i = 0; !bad && i < r->count; i += same) {
@@ -300,6 +314,6 @@ int flight_report_write(const struct flight_report *r, const char *folder)
     print_table(r, stdout);
     printf("%s %s\n", bad ? "incomplete:" : "tables, CSV and plots:", folder);
     for (i = 0; i < r->count; i++)
-        bad |= !r->runs[i].same;
+        bad |= !r->runs[i].same && r->options->exchange == JL_EXCHANGE_GATHER;
     return bad ? 1 : 0;
 }

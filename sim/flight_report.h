@@ -15,6 +15,8 @@ struct flight_run {
     struct estimates e;
     struct traffic traffic;
     int same;                   /* the serial filter's bits                 */
+    double apart;               /* ... or so many sigmas from them at most  */
+    int partial;                /* the run failed: what is here is a start  */
     double serial_us;           /* median step of the serial filter         */
 };
 
@@ -41,9 +43,11 @@ void flight_model_name(char *name, int size, const struct model *model);
 void flight_run_name(struct flight_run *run, const struct model *model,
                      enum hold hold);
 
-/* Print the table and leave table.txt, table.csv, the estimates, errors.csv,
- * track.csv and the plots in the folder.  Returns the exit status: 1 if a file
- * or plot could not be made, or if a run has not the serial filter's bits. */
+/* Print the table and leave table.txt, table.csv, the estimates, track.csv and
+ * the plots in the folder; a partial run's estimates in a file whose name ends
+ * in .partial, and no plots then.  Returns the exit status: 1 if a file or plot
+ * could not be made, or if a run is partial, or has not the serial filter's
+ * bits although it should: without --exchange reduce. */
 int flight_report_write(const struct flight_report *report,
                         const char *folder);
 

@@ -14,6 +14,10 @@
 #define WELL_US 5000000L
 #define FAILED_US 200000L
 
+/* A PE that gets no processor for less than the first is not dead. */
+#define SILENCE_MIN_US 500000L
+#define SILENCE_MAX_US 60000000L
+
 const char *lcm_net_url(const struct options *options)
 {
     static char url[80];
@@ -36,6 +40,14 @@ const char *lcm_net_url(const struct options *options)
     return url;
 }
 
+static jl_u32 silence_us(const struct options *options)
+{
+    long us = options->timeout_us;
+
+    return (jl_u32)(us < SILENCE_MIN_US ? SILENCE_MIN_US
+                    : us > SILENCE_MAX_US ? SILENCE_MAX_US : us);
+}
+
 int lcm_node_open(struct lcm_node *node, int which, const char *url,
                   const char *run, const struct model *model,
                   const struct options *options)
@@ -53,7 +65,9 @@ int lcm_node_open(struct lcm_node *node, int which, const char *url,
     config.nodes = node->nodes;
     config.number = JL_REAL_OCTETS;
     config.max_len = run_max_len(model);
-    config.slots = 2;
+    config.slots = run_slots(options);
+    config.silence_us = silence_us(options);
+    config.beat_us = config.silence_us / 8;
     node->lcm = jl_lcm_open(&config, &why);
     if (node->lcm == NULL) {
         complain(url, 0, NULL, "LCM cannot be used: %s", why);
@@ -69,6 +83,7 @@ int lcm_node_open(struct lcm_node *node, int which, const char *url,
 
 void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic)
 {
+    jl_link_count count = jl_lcm_count(node->lcm);
     int i;
 
     for (i = 0; i < node->nodes; i++)
@@ -76,7 +91,31 @@ void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic)
             traffic->messages += node->to[i]->messages;
             traffic->octets += node->to[i]->octets;
         }
-    traffic->resent += jl_lcm_count(node->lcm).resent;
+    traffic->resent += count.resent;
+    traffic->refused += count.refused + count.stale;
+}
+
+void lcm_say_refused(const struct traffic *traffic)
+{
+    if (traffic->refused > 0)
+        complain("LCM", 0, NULL, "%lu datagrams that do not belong to this "
+                 "run were refused", traffic->refused);
+}
+
+int lcm_node_silent(const struct lcm_node *node,
+                    const struct options *options)
+{
+    long us, most = options->timeout_us / 2;
+    int pe, silent = -1;
+
+    for (pe = 0; pe < node->nodes - 1; pe++) {
+        us = jl_lcm_silence(node->lcm, pe);
+        if (us >= most) {
+            most = us;
+            silent = pe;
+        }
+    }
+    return silent;
 }
 
 void lcm_node_hint(const struct lcm_node *node)

@@ -25,8 +25,17 @@ int lcm_node_open(struct lcm_node *node, int which, const char *url,
                   const char *run, const struct model *model,
                   const struct options *options);
 
-/* What this node sent. */
+/* Add what this node sent, and what it refused. */
 void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic);
+
+/* After a run that went well: if datagrams were refused, a line that says so.
+ */
+void lcm_say_refused(const struct traffic *traffic);
+
+/* After a failure: the PE that has been silent for longest, and for half of the
+ * timeout at least; -1: none. */
+int lcm_node_silent(const struct lcm_node *node,
+                    const struct options *options);
 
 /* After a failure: if datagrams were refused, a line that says what that may
  * mean. */

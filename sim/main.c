@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "command.h"
+#include "interrupt.h"
 #include "jumplink.h"
 
 static const struct {
@@ -55,8 +56,11 @@ int main(int argc, char **argv)
         return 2;
     }
     for (i = 0; i < COMMANDS; i++)
-        if (strcmp(argv[1], commands[i].name) == 0)
+        if (strcmp(argv[1], commands[i].name) == 0) {
+            if (commands[i].run != cmd_pe)      /* its host says the word */
+                interrupt_catch();
             return commands[i].run(argc - 1, argv + 1);
+        }
     if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) {
         help(stdout);
         return 0;

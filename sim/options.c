@@ -102,12 +102,22 @@ static int take_word(const char **to, const char *command, const char *option,
         : misuse(command, "--%s: must not be empty", option);
 }
 
+static const char *const topologies[] = {       /* JL_TOPO_... in order */
+    "full", "star", "ring", "chain", NULL
+};
+
+const char *options_topology(const struct options *o)
+{
+    return topologies[o->topology];
+}
+
 int options_take(struct options *o, int c, char *const *argv)
 {
     const char *value = optarg;
     static const char *const filters[] = { "imm", "kf", NULL };
     static const char *const forms[] = { "joseph", "standard", NULL };
     static const char *const holds[] = { "none", "detect", "column", NULL };
+    static const char *const exchanges[] = { "gather", "reduce", NULL };
     long number = 0;
     int i, status = 0;
 
@@ -156,6 +166,12 @@ int options_take(struct options *o, int c, char *const *argv)
         return take_word(&o->time, o->command, "time", value);
     case 1012:
         return option_seconds(&o->start_us, o->command, "start", value);
+    case 1013:
+        o->topology = choose(o->command, "topology", value, topologies);
+        return o->topology < 0 ? 2 : 0;
+    case 1014:
+        o->exchange = choose(o->command, "exchange", value, exchanges);
+        return o->exchange < 0 ? 2 : 0;
     case 'o':
         return take_word(&o->out, o->command, "out", value);
     case ':':

@@ -16,6 +16,8 @@ enum hold {                     /* which rows count as arrived */
 /* BY_HAND: over LCM, with PEs that somebody else starts. */
 enum port { PORT_NONE, PORT_LOOP, PORT_THREADS, PORT_LCM, PORT_BY_HAND };
 
+struct live_input;
+
 struct options {
     const char *command;        /* for messages: "filter"                   */
     int kf;                     /* 0: imm, 1: kf of one mode                */
@@ -24,10 +26,13 @@ struct options {
     enum hold hold;
     enum port port;             /* PORT_NONE: serial                        */
     int pes;
+    int topology;               /* JL_TOPO_...                              */
+    int exchange;               /* JL_EXCHANGE_...                          */
     long timeout_us;            /* of each answer in a parallel run         */
     long start_us;              /* for all to be there at its start         */
     const char *lcm_url;        /* NULL: a private network                  */
     const char *run;            /* name of an LCM run, or NULL              */
+    struct live_input *live;    /* rows come from there, one by one; or NULL */
     const char *z, *time;       /* columns of the data                      */
     const char *out;            /* -o or --out                              */
 };
@@ -47,6 +52,8 @@ struct options {
     { "z", required_argument, NULL, 1010 }, \
     { "time", required_argument, NULL, 1011 }, \
     { "start", required_argument, NULL, 1012 }, \
+    { "topology", required_argument, NULL, 1013 }, \
+    { "exchange", required_argument, NULL, 1014 }, \
     { "out", required_argument, NULL, 'o' }, \
     { "help", no_argument, NULL, 'h' }
 
@@ -64,12 +71,19 @@ struct options {
     "  --time NAME       column of the time (default t_s, else k)\n"
 #define HELP_HELP \
     "  -h, --help        this text\n"
+#define EXCHANGE_HELP \
+    "  --topology full|star|ring|chain  which PEs are joined (default full)\n" \
+    "  --exchange gather|reduce  in a step PEs exchange every mode's\n" \
+    "                    estimate (default: the serial filter's bits), or\n" \
+    "                    only a pool each: for chains Pi = diag + 1 v'\n"
 #define PORT_HELP \
+    EXCHANGE_HELP \
     "  --timeout S       longest wait for an answer (default 2)\n" \
     "  --start S         longest wait for the PEs to start (default 10)\n" \
     "  --lcm-url URL     LCM address, on the network as it is (default: a\n" \
     "                    private network for this run)\n"
 #define RUN_HELP \
+    EXCHANGE_HELP \
     "  --run NAME        name of the run, if several share a network: 1 to\n" \
     "                    16 letters, digits or _ (default jumplink)\n" \
     "  --start S         longest wait for PEs that are not there yet\n" \
@@ -81,6 +95,9 @@ struct options {
 const char *options_port_name(enum port port);
 
 void options_init(struct options *options, const char *command);
+
+/* The topology's name. */
+const char *options_topology(const struct options *options);
 
 /* getopt_long's short options: those of COMMON_OPTIONS, and no words of its
  * own about wrong ones. */

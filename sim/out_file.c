@@ -117,3 +117,35 @@ int out_close(struct out_file *out, int keep)
     memset(out, 0, sizeof *out);
     return 0;
 }
+
+static int is_folder(const char *path)
+{
+    int error = errno;
+    struct stat is;
+
+    if (stat(path, &is) == 0) {
+        errno = ENOTDIR;
+        return S_ISDIR(is.st_mode);
+    }
+    errno = error;
+    return 0;
+}
+
+int out_folder(const char *path)
+{
+    char *copy = strdup(path), *p;
+    int status = 0;
+
+    for (p = copy; status == 0 && p != NULL; ) {
+        p = strchr(p + 1, '/');
+        if (p != NULL)
+            *p = '\0';
+        if (mkdir(copy, 0777) != 0 && !is_folder(copy))
+            status = complain(copy, 0, NULL, "cannot create the folder: %s",
+                              strerror(errno));
+        if (p != NULL)
+            *p = '/';
+    }
+    free(copy);
+    return status;
+}

@@ -20,4 +20,7 @@ int out_open(struct out_file *out, const char *path);
  * error (then nothing is left at path that was not there before). */
 int out_close(struct out_file *out, int keep);
 
+/* Have a folder, and those that it is in.  Returns 0, or -1 after a message. */
+int out_folder(const char *path);
+
 #endif

@@ -12,6 +12,7 @@ struct traffic {
     unsigned long messages;
     unsigned long octets;
     unsigned long resent;       /* datagrams sent again                     */
+    unsigned long refused;      /* datagrams of strangers, dropped          */
 };
 
 /* Each runs the filter over all rows of the record into *e.  On failure prints
@@ -44,6 +45,9 @@ jl_u32 run_fingerprint(const struct model *model,
 /* Octets of the longest message of the model, and of channels that hold it. */
 int run_max_len(const struct model *model);
 
+/* Messages that channels between PEs must hold, for none to wait. */
+int run_slots(const struct options *options);
+
 /* PE pe's part, until the host says stop; to and from have options->pes + 1
  * entries, of which the last is the host's.  Returns JL_OK, or a code of base.h
  * after a line that says why. */
@@ -55,16 +59,23 @@ struct run_host {
     jl_chan *to, *from;
     int (*alive)(void *context);
     void *context;
+    int failed_pe;              /* the PE that PE0 gave up; -1: none        */
 };
 
+/* Besides the codes of base.h: a signal ended the run (interrupt.h). */
+#define RUN_INTERRUPTED 2
+
 /* Returns JL_OK; or, with a step that failed in *row, its code; or the error of
- * a channel, with the row it happened at, or -1: at the start. */
-int run_host(struct estimates *e, long *row, const struct run_host *host,
+ * a channel or RUN_INTERRUPTED, with the row it happened at, or -1: at the
+ * start. */
+int run_host(struct estimates *e, long *row, struct run_host *host,
              const struct model *model, const struct data_file *data,
              const struct options *options);
 
-/* Say in one line why run_host or a serial step failed.  Returns 1. */
-int run_failed(const struct data_file *data, long row, int status);
+/* Say in one line why run_host or a serial step failed; of a PE with whom the
+ * run cannot go on, its name.  Returns 1. */
+int run_failed(const struct data_file *data, long row, int status,
+               int failed_pe);
 
 /* 1 if the status comes from a channel and not from the filter. */
 int run_is_channels(int status);

@@ -13,7 +13,7 @@ static int write_estimates(const struct estimates *e,
 
     if (out_open(&out, path) != 0)
         return 1;
-    estimates_write(e, data, out.stream);
+    estimates_write(e, data, 0, out.stream);
     return out_close(&out, 1) == 0 ? 0 : 1;
 }
 
@@ -44,6 +44,8 @@ static int run_data(const struct model *model, const struct data_file *data,
     progress_begin(NULL);
     if (status == 0)
         status = write_estimates(&e, data, options->out);
+    else
+        (void)estimates_save_partial(&e, data, options->out);
     estimates_close(&e);
     return status;
 }

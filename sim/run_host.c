@@ -2,29 +2,40 @@
 #include "run.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "clock.h"
 #include "complain.h"
+#include "interrupt.h"
 #include "jumplink/par.h"
+#include "live_input.h"
 #include "progress.h"
+#include "typed.h"
 
 int run_is_channels(int status)
 {
-    return status <= JL_ETIMEOUT;
+    return status <= JL_ETIMEOUT && status != JL_ECHAIN;
 }
 
-int run_failed(const struct data_file *data, long row, int status)
+int run_failed(const struct data_file *data, long row, int status,
+               int failed_pe)
 {
-    if (row < 0)
-        complain("PEs", 0, NULL, "the run does not start: %s%s",
-                 run_is_channels(status) && status != JL_EMODEL
-                 ? "no word from PE0: " : "",
+    char where[400] = "the run does not start", who[32] = "";
+
+    if (row >= 0)
+        snprintf(where, sizeof where, "the run ends at %s:%ld", data->path,
+                 data->line[row]);
+    if (failed_pe >= 0)
+        snprintf(who, sizeof who, "no word from PE%d: ", failed_pe);
+    else if (row < 0 && run_is_channels(status) && status != JL_EMODEL)
+        strcpy(who, "no word from PE0: ");
+    if (status == RUN_INTERRUPTED)
+        complain("interrupted", 0, NULL, "%s by %s", where, interrupted());
+    else if (row < 0 || run_is_channels(status))
+        complain("PEs", 0, NULL, "%s: %s%s", where, who,
                  jl_status_text(status));
-    else if (run_is_channels(status))
-        complain("PEs", 0, NULL, "the run ends at %s:%ld: %s", data->path,
-                 data->line[row], jl_status_text(status));
     else
         complain(data->path, data->line[row], NULL, "the step fails: %s",
                  jl_status_text(status));
@@ -35,7 +46,7 @@ int run_failed(const struct data_file *data, long row, int status)
 #define SLICE_US 100000L
 
 /* Receive within the deadline, in slices.  `estimate` NULL: the ready word. */
-static int receive(const struct run_host *host, jl_estimate *estimate,
+static int receive(struct run_host *host, jl_estimate *estimate,
                    jl_u32 fingerprint, const struct model *model,
                    unsigned char *buf, int cap, long timeout_us)
 {
@@ -49,15 +60,19 @@ static int receive(const struct run_host *host, jl_estimate *estimate,
             ? jl_host_ready(host->from, fingerprint, buf, cap, slice)
             : jl_host_recv(host->from, estimate, model->M, model->n, buf, cap,
                            slice);
+        if (status == JL_ETIMEOUT && interrupted() != NULL)
+            return RUN_INTERRUPTED;
         if (status == JL_ETIMEOUT && host->alive != NULL
             && !host->alive(host->context))
             return JL_ECLOSED;
     } while (status == JL_ETIMEOUT && left > 0);
+    if (status < 0 && estimate != NULL)
+        host->failed_pe = estimate->failed_pe;
     return status;
 }
 
 static int host_row(struct estimates *e, long row,
-                    const struct run_host *host, const jl_meas *meas,
+                    struct run_host *host, const jl_meas *meas,
                     jl_estimate *estimate, const struct model *model,
                     unsigned char *buf, int cap, long timeout_us)
 {
@@ -78,36 +93,89 @@ static int host_row(struct estimates *e, long row,
     return status;
 }
 
-/* The answer to a measurement may come as late as a PE's own deadline. */
+/* The answer to a measurement may come as late as the last deadline of a PE:
+ * no hop's level is beyond 2 pes (plan.h). */
 static long answer_us(const struct options *options)
 {
-    return options->timeout_us + 1000000;
+    return options->timeout_us + options->timeout_us / 8 * 2 * options->pes
+        + 1000000;
+}
+
+/* The longest look at the network for a measurement, and then the links. */
+#define LOOK_US 20000L
+
+/* Nothing is on its way while the host waits for a measurement, so what comes
+ * is the end of the run; and the links go on only in a call. */
+static int keep_going(struct run_host *host, const struct model *model,
+                      jl_estimate *estimate, unsigned char *buf, int cap)
+{
+    int status = jl_host_recv(host->from, estimate, model->M, model->n, buf,
+                              cap, 0);
+
+    host->failed_pe = estimate->failed_pe;
+    if (status == JL_OK)
+        return JL_EMSG;
+    if (status == JL_ETIMEOUT && host->alive != NULL
+        && !host->alive(host->context))
+        return JL_ECLOSED;
+    return status == JL_ETIMEOUT ? JL_OK : status;
+}
+
+/* JL_OK: the record has the row; LIVE_END: it is over; or why it cannot. */
+static int next_row(struct estimates *e, long row, struct run_host *host,
+                    const struct model *model, const struct data_file *data,
+                    struct live_input *live, jl_estimate *estimate,
+                    unsigned char *buf, int cap)
+{
+    int status;
+
+    if (live == NULL)
+        return row < data->rows ? JL_OK : LIVE_END;
+    while ((status = live_row(live, row, LOOK_US)) == JL_ETIMEOUT) {
+        status = keep_going(host, model, estimate, buf, cap);
+        if (status != JL_OK)
+            return status;
+    }
+    if (status == JL_OK && estimates_grow(e, row + 1) != 0)
+        status = JL_ENOMEM;
+    return status;
 }
 
 static int host_rows(struct estimates *e, long *row,
-                     const struct run_host *host, const struct model *model,
+                     struct run_host *host, const struct model *model,
                      const struct data_file *data,
                      const struct options *options, jl_estimate *estimate,
-                     unsigned char *buf, int cap)
+                     unsigned char *buf, int cap, struct typed *typed)
 {
     struct feed feed;
     jl_meas meas;
-    int status = JL_OK;
+    int fed, status;
 
     if (feed_open(&feed, data, model, options) != 0)
         return JL_EDIM;
-    for (*row = 0; *row < data->rows; ++*row) {
-        if (feed_meas(&feed, *row, &meas))
+    for (*row = 0; ; ++*row) {
+        status = next_row(e, *row, host, model, data, options->live, estimate,
+                          buf, cap);
+        if (status != JL_OK)
+            break;
+        fed = feed_meas(&feed, *row, &meas);
+        typed_measurement(typed, *row, fed ? meas.z : NULL);
+        if (fed)
             status = host_row(e, *row, host, &meas, estimate, model, buf, cap,
                               answer_us(options));
+        if (fed && (status == JL_OK || !run_is_channels(status)))
+            typed_estimate(typed, *row, estimate);
+        if (status == JL_OK && options->live == NULL && interrupted() != NULL)
+            status = RUN_INTERRUPTED;
         if (status != JL_OK)
             return status;
         progress(*row + 1, data->rows);
     }
-    return JL_OK;
+    --*row;                             /* the last that was there */
+    return status == LIVE_END ? JL_OK : status;
 }
 
-int run_host(struct estimates *e, long *row, const struct run_host *host,
+int run_host(struct estimates *e, long *row, struct run_host *host,
              const struct model *model, const struct data_file *data,
              const struct options *options)
 {
@@ -115,8 +183,10 @@ int run_host(struct estimates *e, long *row, const struct run_host *host,
     unsigned char *buf = malloc((size_t)cap);
     jl_real *mem = calloc((size_t)(n + n * n + model->M), sizeof *mem);
     jl_estimate estimate;
+    struct typed typed;
 
     *row = -1;
+    host->failed_pe = -1;
     if (buf == NULL || mem == NULL) {
         free(buf);
         free(mem);
@@ -128,9 +198,12 @@ int run_host(struct estimates *e, long *row, const struct run_host *host,
     estimate.mu = estimate.P + n * n;
     status = receive(host, NULL, run_fingerprint(model, options), model, buf,
                      cap, options->start_us + 1000000);
-    if (status == JL_OK)
+    if (status == JL_OK) {
+        typed_open(&typed, model, data, options);
         status = host_rows(e, row, host, model, data, options, &estimate, buf,
-                           cap);
+                           cap, &typed);
+        typed_close(&typed);
+    }
     if (status == JL_OK || !run_is_channels(status))
         (void)jl_host_stop(host->to, buf, cap, options->timeout_us);
     free(buf);

@@ -21,10 +21,12 @@ struct job {
 
 static int open_port(struct job *job, int nodes, int max_len)
 {
+    int slots = run_slots(job->options);
+
     if (job->options->port == PORT_LOOP)
-        job->loop = jl_loop_new(nodes, max_len, 2);
+        job->loop = jl_loop_new(nodes, max_len, slots);
     else
-        job->threads = jl_threads_new(nodes, max_len, 2);
+        job->threads = jl_threads_new(nodes, max_len, slots);
     return job->loop != NULL || job->threads != NULL;
 }
 
@@ -68,13 +70,13 @@ static void body(int node, void *context)
             from[i] = rx(job, i, node);
         }
     if (node == pes) {
-        struct run_host host = { to[0], from[0], NULL, NULL };
+        struct run_host host = { to[0], from[0], NULL, NULL, -1 };
         long row;
         int status = run_host(job->e, &row, &host, job->model, job->data,
                               job->options);
 
         job->status = status == JL_OK ? 0
-            : run_failed(job->data, row, status);
+            : run_failed(job->data, row, status, host.failed_pe);
     } else {
         (void)run_pe(node, job->model, job->options, to, from);
     }

@@ -24,13 +24,15 @@
 struct pe {
     pid_t pid;                  /* 0: not started, or waited for            */
     int status;                 /* of waitpid                               */
+    int overdue;                /* ended by us, for it did not leave        */
     FILE *words;                /* what it prints                           */
 };
 
 struct crew {
     int pes;
     struct pe pe[JL_MAX_PES];
-    char complaint[200];        /* the first that a PE printed              */
+    char complaint[200];        /* the first of a PE about itself           */
+    char hearsay[200];          /* ... about another                        */
 };
 
 /* --- starting ------------------------------------------------------------ */
@@ -41,7 +43,7 @@ static void become_pe(int pe, const char *url, const char *run,
                       const struct options *options, pid_t parent)
 {
     char which[16], pes[16], mode[16], timeout[32], wait[32];
-    const char *argv[24];
+    const char *argv[32];
     int n = 0;
 
     snprintf(which, sizeof which, "%d", pe);
@@ -65,6 +67,12 @@ static void become_pe(int pe, const char *url, const char *run,
     argv[n++] = timeout;
     argv[n++] = "--start";
     argv[n++] = wait;
+    argv[n++] = "--topology";
+    argv[n++] = options_topology(options);
+    if (options->exchange == JL_EXCHANGE_REDUCE) {
+        argv[n++] = "--exchange";
+        argv[n++] = "reduce";
+    }
     argv[n++] = "--form";
     argv[n++] = options->form == &jl_kf_joseph ? "joseph" : "standard";
     if (options->kf) {
@@ -77,7 +85,10 @@ static void become_pe(int pe, const char *url, const char *run,
         }
     }
     argv[n] = NULL;
+    close_range(3, ~0u, 0);             /* LCM's sockets are not for it */
     prctl(PR_SET_PDEATHSIG, SIGKILL);
+    signal(SIGINT, SIG_IGN);            /* of the terminal: the host ends */
+    signal(SIGHUP, SIG_IGN);            /* the run, and so does a PE      */
     if (getppid() == parent)
         execv("/proc/self/exe", (char *const *)argv);
     _exit(126);
@@ -135,36 +146,40 @@ static int crew_alive(void *context)
 
 /* --- ending -------------------------------------------------------------- */
 
-/* Add up what a PE printed when it left (cmd_pe.c), and keep a complaint.
+/* Add up what a PE printed when it left (cmd_pe.c), and keep complaints.
  * Returns 1 if it left in order. */
 static int take_words(struct crew *crew, struct pe *pe,
                       struct traffic *traffic)
 {
     static const char complains[] = "jumplink: ";
-    unsigned long messages, octets, resent;
-    char line[200];
+    unsigned long messages, octets, resent, refused;
+    char line[200], *keep;
     int left = 0;
 
     while (fgets(line, sizeof line, pe->words) != NULL) {
         line[strcspn(line, "\n")] = '\0';
         if (sscanf(line, "pe %*d of %*d: %lu messages, %lu octets, "
-                   "%lu sent again", &messages, &octets, &resent) == 3) {
+                   "%lu sent again, %lu refused", &messages, &octets, &resent,
+                   &refused) == 4) {
             traffic->messages += messages;
             traffic->octets += octets;
             traffic->resent += resent;
+            traffic->refused += refused;
             left = 1;
-        } else if (crew->complaint[0] == '\0'
-                   && strncmp(line, complains, sizeof complains - 1) == 0) {
-            strcpy(crew->complaint, line + sizeof complains - 1);
+        } else if (strncmp(line, complains, sizeof complains - 1) == 0) {
+            keep = strstr(line, ": no word from ") != NULL
+                || strstr(line, ": given up by ") != NULL
+                ? crew->hearsay : crew->complaint;
+            if (keep[0] == '\0')
+                strcpy(keep, line + sizeof complains - 1);
         }
     }
     fclose(pe->words);
     return left && pe->status == 0;
 }
 
-/* Wait for all PEs to leave; end those that do not.  A PE that was ended by a
- * signal that is not ours is the reason of whatever others complain about.
- * Returns 0 if all left in order, else 1 with a complaint. */
+/* Wait for all PEs to leave; end those that do not.  Returns 0 if all left in
+ * order, else 1. */
 static int dismiss(struct crew *crew, struct traffic *traffic, double wait_us)
 {
     double deadline = clock_us() + wait_us;
@@ -179,19 +194,43 @@ static int dismiss(struct crew *crew, struct traffic *traffic, double wait_us)
             kill(p->pid, SIGKILL);
             waitpid(p->pid, &p->status, 0);
             p->pid = 0;
-        } else if (WIFSIGNALED(p->status)) {
-            snprintf(crew->complaint, sizeof crew->complaint,
-                     "PEs: PE%d was ended by signal %d", pe,
-                     WTERMSIG(p->status));
+            p->overdue = 1;
         }
     }
     for (pe = 0; pe < crew->pes; pe++)
         if (crew->pe[pe].words != NULL)
             bad |= !take_words(crew, &crew->pe[pe], traffic);
-    if (bad && crew->complaint[0] == '\0')
-        snprintf(crew->complaint, sizeof crew->complaint,
-                 "PEs: a PE did not leave in order");
     return bad;
+}
+
+/* Why the run failed, in one line.  A PE that a signal ended is the reason of
+ * whatever others complain about; then what a PE says of itself; then one that
+ * fell silent; then what a PE says of another, and what the host met. */
+static void say_why(const struct crew *crew, const struct data_file *data,
+                    long row, int status, const struct run_host *host)
+{
+    int pe;
+
+    for (pe = 0; pe < crew->pes; pe++) {
+        const struct pe *p = &crew->pe[pe];
+
+        if (!p->overdue && p->pid == 0 && WIFSIGNALED(p->status)) {
+            complain("PEs", 0, NULL, "PE%d was ended by signal %d (%s)", pe,
+                     WTERMSIG(p->status), strsignal(WTERMSIG(p->status)));
+            return;
+        }
+    }
+    progress_clear();
+    if (crew->complaint[0] != '\0')
+        fprintf(stderr, "jumplink: %s\n", crew->complaint);
+    else if (host->failed_pe >= 0)
+        (void)run_failed(data, row, status, host->failed_pe);
+    else if (crew->hearsay[0] != '\0')
+        fprintf(stderr, "jumplink: %s\n", crew->hearsay);
+    else if (status != JL_OK)
+        (void)run_failed(data, row, status, -1);
+    else
+        complain("PEs", 0, NULL, "a PE did not leave in order");
 }
 
 int run_lcm(struct estimates *e, struct traffic *traffic,
@@ -201,6 +240,7 @@ int run_lcm(struct estimates *e, struct traffic *traffic,
     static int count;
     char run[17];
     const char *url = lcm_net_url(options);
+    struct run_host host = { NULL, NULL, crew_alive, NULL, -1 };
     struct lcm_node node;
     struct crew crew;
     long row = -1;
@@ -214,29 +254,31 @@ int run_lcm(struct estimates *e, struct traffic *traffic,
         (void)dismiss(&crew, traffic, 0);
         return 1;
     }
-    {
-        struct run_host host = { node.to[0], node.from[0], crew_alive, &crew };
-
-        status = run_host(e, &row, &host, model, data, options);
-    }
+    host.to = node.to[0];
+    host.from = node.from[0];
+    host.context = &crew;
+    status = run_host(e, &row, &host, model, data, options);
+    if (run_is_channels(status) && host.failed_pe < 0)
+        host.failed_pe = lcm_node_silent(&node, options);
     lcm_node_traffic(&node, traffic);
     lcm_node_close(&node, status == JL_OK);
     bad = dismiss(&crew, traffic, status == JL_OK ? LEAVE_US : FAIL_US);
-    if (status != JL_OK && !run_is_channels(status))
-        return run_failed(data, row, status);
-    progress_clear();
-    if (bad)
-        fprintf(stderr, "jumplink: %s\n", crew.complaint);
-    else if (status != JL_OK)
-        return run_failed(data, row, status);
-    return bad || status != JL_OK;
+    if (status == JL_OK && !bad) {
+        lcm_say_refused(traffic);
+        return 0;
+    }
+    if (run_is_channels(status) || status == JL_OK)
+        say_why(&crew, data, row, status, &host);
+    else
+        (void)run_failed(data, row, status, -1);
+    return 1;
 }
 
 int run_by_hand(struct estimates *e, struct traffic *traffic,
                 const struct model *model, const struct data_file *data,
                 const struct options *options)
 {
-    struct run_host host = { NULL, NULL, NULL, NULL };
+    struct run_host host = { NULL, NULL, NULL, NULL, -1 };
     struct lcm_node node;
     long row;
     int status;
@@ -249,8 +291,12 @@ int run_by_hand(struct estimates *e, struct traffic *traffic,
     status = run_host(e, &row, &host, model, data, options);
     lcm_node_traffic(&node, traffic);
     if (status != JL_OK) {
-        (void)run_failed(data, row, status);
+        if (run_is_channels(status) && host.failed_pe < 0)
+            host.failed_pe = lcm_node_silent(&node, options);
+        (void)run_failed(data, row, status, host.failed_pe);
         lcm_node_hint(&node);
+    } else {
+        lcm_say_refused(traffic);
     }
     lcm_node_close(&node, status == JL_OK);
     return status == JL_OK ? 0 : 1;

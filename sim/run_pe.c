@@ -14,15 +14,24 @@ int run_max_len(const struct model *model)
     return JL_PAR_MSG(model->M, model->n, model->m);
 }
 
+/* A ring's exchange sends up to pes/2 messages to a neighbour. */
+int run_slots(const struct options *options)
+{
+    return options->topology == JL_TOPO_RING && options->pes > 4
+        ? options->pes / 2 : 2;
+}
+
 jl_u32 run_fingerprint(const struct model *model,
                        const struct options *options)
 {
-    unsigned char more[4];
+    unsigned char more[6];
 
     more[0] = (unsigned char)options->pes;
     more[1] = options->form == &jl_kf_joseph;
     more[2] = (unsigned char)(options->kf ? options->mode + 2 : 0);
     more[3] = JL_REAL_OCTETS;
+    more[4] = (unsigned char)options->topology;
+    more[5] = (unsigned char)options->exchange;
     return jl_crc32(model->fingerprint, more, sizeof more);
 }
 
@@ -36,10 +45,13 @@ static void pe_failed(int pe, const jl_par *par, int status)
         complain(name, 0, NULL, "%s", jl_status_text(status));
         return;
     }
-    if (par->failed_pe < par->config.npe)
+    if (par->failed_pe == pe)
+        strcpy(other, "the others");
+    else if (par->failed_pe < par->config.npe)
         snprintf(other, sizeof other, "PE%d", par->failed_pe);
     complain(name, 0, NULL, "%s %s: %s", par->failed == JL_EMODEL
-             ? "not like" : "no word from", other, jl_status_text(status));
+             ? "not like" : par->failed_pe == pe
+             ? "given up by" : "no word from", other, jl_status_text(status));
 }
 
 int run_pe(int pe, const struct model *model, const struct options *options,
@@ -64,6 +76,8 @@ int run_pe(int pe, const struct model *model, const struct options *options,
         config.pe = pe;
         config.npe = options->pes;
         config.owner = owner;
+        config.topology = options->topology;
+        config.exchange = options->exchange;
         config.to = to;
         config.from = from;
         config.to_host = to[options->pes];

@@ -6,6 +6,7 @@
 #include "bank.h"
 #include "clock.h"
 #include "complain.h"
+#include "interrupt.h"
 #include "progress.h"
 
 int run_serial(struct estimates *e, const struct model *model,
@@ -39,8 +40,10 @@ int run_serial(struct estimates *e, const struct model *model,
                                            : (double)NAN);
         if (status == JL_STARTED)
             status = JL_OK;
+        if (status == JL_OK && options->live == NULL && interrupted() != NULL)
+            status = RUN_INTERRUPTED;
         progress(row + 1, data->rows);
     }
     bank_close(&bank);
-    return status == JL_OK ? 0 : run_failed(data, row - 1, status);
+    return status == JL_OK ? 0 : run_failed(data, row - 1, status, -1);
 }

@@ -114,8 +114,9 @@ int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,
  * JL_ESINGULAR; the filter is then as before the step. */
 int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch);
 
-/* The four stages, scratch as above, in this order; mix may be called at any time and starts the
- * step anew; combine combines the present state and may be called at any time.
+/* The four stages, scratch as above, in this order; mix may be called at any
+ * time and starts the step anew; combine combines the present state and may be
+ * called at any time.
  * Returns: as jl_imm_step, and JL_EORDER for filter without mix, or weigh
  * without filter or after a failure.  chain and set end a step under way. */
 int jl_imm_mix(jl_imm *imm, jl_real *scratch);
@@ -128,8 +129,9 @@ void jl_imm_combine(jl_imm *imm);
  * update_mode for every j.  A processor does so for the modes it owns; l[j],
  * xw[j], Pw[j] of the others come to it by message; then, if no mode has failed
  * anywhere, it calls weigh.  (It must own a mode: update_mode opens weigh.)
- * 0 <= j < M; scratch as above.  foresee computes c of all modes from mu of all modes; mix_mode, predict_mode
- * and update_mode leave their result in xw[j], Pw[j], and l[j]. */
+ * 0 <= j < M; scratch as above.  foresee computes c of all modes from mu of all
+ * modes; mix_mode, predict_mode and update_mode leave their result in xw[j],
+ * Pw[j], and l[j]. */
 void jl_imm_foresee(jl_imm *imm);
 void jl_imm_mix_mode(jl_imm *imm, int j, jl_real *scratch);
 int jl_imm_predict_mode(jl_imm *imm, int j, jl_real *scratch);

@@ -21,10 +21,11 @@
  * Sessions.  Each end has a session number, new for every start of the
  * program.  HELLO frames tell it to the other end, and the link is up only
  * when a frame has shown that the other end knows ours: a recorded frame, or
- * one of an earlier life of the other end, never can.  When an end that is up
- * hears of another session of the other end, it asks that session (DOUBT).
- * Only a living other end answers (ALIVE); then it has restarted, and the link
- * fails with JL_EPEER: what was under way cannot be known to have arrived.
+ * one of a life of the other end that was over before ours began, never can.
+ * When an end that is up hears of another session of the other end, it asks
+ * that session (DOUBT).  Only a living other end answers (ALIVE); then it has
+ * restarted, and the link fails with JL_EPEER: what was under way cannot be
+ * known to have arrived.
  *
  * Silence.  An end that is up says something at least every beat_us until the
  * other end knows that it has closed.  One that has listened for silence_us and
@@ -101,6 +102,7 @@ typedef struct jl_link {
     jl_u32 out_end;             /* behind the last piece handed to us       */
     jl_u32 sent_at;             /* when a piece or HELLO last went out      */
     jl_u32 wait_us;             /* how long from then until sent again      */
+    int heeded;                 /* times the other end asked for out_first  */
     unsigned char *in;          /* ring of pieces not fetched by recv       */
     int in_slot;                /* where in the ring the oldest lies        */
     int in_held;                /* pieces in the ring                       */
@@ -169,7 +171,8 @@ int jl_link_output(jl_link *link, unsigned char *datagram, int cap,
 int jl_link_judge(jl_link *link, jl_u32 now);
 
 /* Microseconds since the other end was last heard, listening or not (after
- * 67 s: JL_LINK_MAX_US); -1 if the link is not up, or the other end closed. */
+ * 67 s: JL_LINK_MAX_US); -1 if the link is not up, unless it has failed for
+ * silence, or the other end closed. */
 long jl_link_silence(const jl_link *link, jl_u32 now);
 
 /* Microseconds until jl_link_output or jl_link_judge may have something by time

@@ -1,19 +1,29 @@
 /* The IMM spread over processing elements (PEs) joined by channels.
  *
  * Each mode has an owner.  For every measurement
- *     PE0 receives it from the host and sends it to the others;
+ *     PE0 receives it from the host, and it is passed on to the others;
  *     every PE predicts and updates its own modes;
- *     one exchange: every PE sends every other (status, l_j, x_j, P_j) of its
- *     own modes;
+ *     one exchange (plan.h): every PE gives every other (status, l_j, x_j, P_j)
+ *     of its own modes;
  *     every PE weighs all modes itself, with the same code in the same order;
  *     PE0 combines and answers the host.
  * All sums run over modes in index order, so the result has the bits of
- * jl_imm_step for any number of PEs, any owner table and any transport.  If a
- * mode fails on any PE, all PEs see its status, and none changes its filter.
+ * jl_imm_step for any number of PEs, any owner table, topology and transport.
+ * If a mode fails on any PE, all PEs see its status, and none changes its
+ * filter.
  * (Pan, Dai, Zhang 1997, sections 3-6, with their three exchanges made one.)
  *
- * The exchange is one totally ordered list of hops, of which each PE executes
- * its part, so it cannot deadlock even when every channel is a rendezvous.
+ * For sticky chains (imm.h) the exchange may instead be an all-reduce, whose
+ * messages hold, whatever the number of modes, one estimate a PE: what mixing
+ * needs of the others' modes is their pool.
+ *     pool of PE p   W_p = sum mu_j, x_p = sum mu_j x_j / W_p,
+ *                    P_p = sum mu_j (P_j + (x_j - x_p)(x_j - x_p)') / W_p
+ *                    over the modes j of p; merged in the order of PEs
+ * A PE then knows only its own modes' estimates.  Equal to the serial filter up
+ * to rounding; the same bits for any topology and transport.
+ *
+ * When a PE cannot go on because of another, it tells its neighbours whose
+ * fault it is, and they theirs, so that no relay is blamed for a dead PE.
  */
 #ifndef JL_PAR_H
 #define JL_PAR_H
@@ -21,6 +31,7 @@
 #include "base.h"
 #include "chan.h"
 #include "imm.h"
+#include "plan.h"
 #include "wire.h"
 
 #ifdef __cplusplus
@@ -47,6 +58,7 @@ typedef struct jl_estimate {
     jl_real *x;                 /* [n]                                      */
     jl_real *P;                 /* [n,n]                                    */
     jl_real *mu;                /* [M]                                      */
+    int failed_pe;              /* the PE that PE0 gave up; -1: none        */
 } jl_estimate;
 
 /* Octets of the longest message of a filter with M modes, n states and m
@@ -68,7 +80,8 @@ int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, unsigned char *buf,
                   int cap, long timeout_us);
 
 /* Send a measurement with m components; receive the answer to each before the
- * next, or at most 2 slots + 1 may be on their way (slots of the channels). buf [cap], cap >= JL_PAR_MSG(1, 1, m).
+ * next, or at most 2 slots + 1 may be on their way (slots of the channels).
+ * buf [cap], cap >= JL_PAR_MSG(1, 1, m).
  * Returns JL_OK, JL_ENOMEM, or the channel's error. */
 int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,
                  unsigned char *buf, int cap, long timeout_us);
@@ -76,7 +89,8 @@ int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,
 /* Receive the answer; x [n], P [n,n], mu [M] of *estimate are the caller's.
  * buf [cap], cap >= JL_PAR_MSG(M, n, 1).
  * Returns JL_OK (look at estimate->status), JL_EMSG, JL_ELENGTH, or the
- * channel's error. */
+ * channel's error; or, when PE0 cannot go on because of another PE, the error
+ * of that channel, with estimate->failed_pe: the run is over. */
 int jl_host_recv(jl_chan *from_pe0, jl_estimate *estimate, int M, int n,
                  unsigned char *buf, int cap, long timeout_us);
 
@@ -87,9 +101,9 @@ int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,
 
 /* --- the PE's side ----------------------------------------------------- */
 
-/* Called before a step on every PE that owns modes, with the same arguments: for
- * models rebuilt for meas->dt (jl_mode_motion, then jl_imm_chain), or started
- * from a first measurement (jl_imm_set).  Must do the same on every PE, and if
+/* Called before a step on every PE that owns modes, with the same arguments:
+ * for models rebuilt for meas->dt (jl_mode_motion, then jl_imm_chain), or
+ * started from a first measurement (jl_imm_set).  Must do the same on every PE, and if
  * it changes a mode it must also call jl_imm_chain or jl_imm_set, which void
  * what was computed ahead.
  * Returns JL_OK (now the step), JL_STARTED (the measurement was used to set
@@ -97,20 +111,30 @@ int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,
 #define JL_STARTED 1
 typedef int (*jl_prepare)(void *context, jl_imm *imm, const jl_meas *meas);
 
+enum {                          /* what the exchange carries */
+    JL_EXCHANGE_GATHER = 0,     /* every mode's estimate                    */
+    JL_EXCHANGE_REDUCE = 1      /* ... every PE's pool: sticky chains only  */
+};
+
 typedef struct jl_par_config {
     int pe, npe;                /* which of how many: 0 <= pe < npe         */
     const unsigned char *owner; /* [M] the PE of each mode; the PEs 0..A-1
                                    own at least one each, the rest none     */
-    jl_chan *const *to;         /* [npe] channels to the other PEs          */
-    jl_chan *const *from;       /* [npe] ... and from them; [pe] not used   */
+    int topology;               /* JL_TOPO_...; a ring of which some PEs own
+                                   no mode is used as a chain               */
+    int exchange;               /* JL_EXCHANGE_...                          */
+    jl_chan *const *to;         /* [npe] channels to the PEs joined to this */
+    jl_chan *const *from;       /* [npe] ... and from them; others: not used */
     jl_chan *to_host;           /* PE0 only                                 */
     jl_chan *from_host;
     jl_prepare prepare;         /* or NULL: the model does not change       */
     void *context;
     jl_u32 fingerprint;         /* of the model: equal on all PEs and host  */
     long start_us;              /* longest wait for the others at the start */
-    long timeout_us;            /* ... and for each message of a step; either
-                                   may be JL_FOREVER; the wait for the next
+    long timeout_us;            /* ... and for each message of a step; an
+                                   eighth more for each that must come
+                                   before it (jl_hop.level); either may be
+                                   JL_FOREVER; the wait for the next
                                    measurement has no limit                 */
 } jl_par_config;
 
@@ -121,6 +145,9 @@ typedef struct jl_par {
     int ahead;                  /* own modes are already mixed, predicted   */
     int failed;                 /* JL_OK, or the error of a channel         */
     int failed_pe;              /* ... to or from this PE; npe: the host    */
+    jl_hop hops[JL_HOPS_OF_PE(JL_MAX_PES)];     /* own part of the exchange */
+    int hop_count;
+    jl_real *pool;              /* [n + n*n] of the own modes (all-reduce)  */
     jl_u32 seq;                 /* of the last measurement                  */
     unsigned long steps;        /* measurements used, failed steps too      */
     unsigned long refused;      /* ... and refused, with their code         */
@@ -138,8 +165,9 @@ void jl_par_deal(unsigned char *owner, int M, int npe);
 /* Bind a PE's part to its filter (all M modes on every PE) and memory, which
  * outlive it, as do the arrays that config points to: buf
  * [cap] octets, cap >= JL_PAR_BUF(M, n, m); status [M]; z [m].
- * Returns JL_OK, JL_EDIM (pe, npe, owner), JL_ENOMEM, JL_ETOOLONG (a channel's
- * max_len is below what its messages need); *par is untouched on error. */
+ * Returns JL_OK, JL_EDIM (pe, npe, owner, topology, exchange), JL_ENOMEM,
+ * JL_ETOOLONG (a channel's max_len is below what its messages need); *par is
+ * untouched on error. */
 int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
                 unsigned char *buf, int cap, int *status, jl_real *z);
 
@@ -149,13 +177,16 @@ int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
  * number or a time that goes back) is refused: the host is told why.  scratch
  * [JL_IMM_SCRATCH(M, n, m)], for all three calls; `prepare` may use it too.
  * Returns JL_OK after a stop, JL_EMODEL (the fingerprints differ), or the error
- * of the channel that failed: par->failed_pe says whose. */
+ * of the channel that failed, here or at another PE: par->failed_pe says to
+ * which PE, the one that is to blame as far as this PE was told. */
 int jl_par_serve(jl_par *par, jl_real *scratch);
 
 /* One step, when the measurement is already on every PE and every PE calls
- * this: returns on all of them that own modes the same JL_OK or code of the first mode that
- * failed, as jl_imm_step; or the error of the channel that failed.  The
- * combined estimate is computed on PE0 (on the others call jl_imm_combine).
+ * this: returns on all of them that own modes the same JL_OK or code of the
+ * first mode that failed, as jl_imm_step, or JL_ECHAIN (an all-reduce and a
+ * chain that is not sticky); or the error of the channel that failed.  The
+ * combined estimate is computed on PE0 (on the others call jl_imm_combine; an all-reduce computes it
+ * on all, and jl_imm_combine is of no use).
  * After the error of a channel the PEs may differ: the run is over. */
 int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch);
 

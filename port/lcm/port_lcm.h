@@ -65,10 +65,10 @@ void jl_lcm_close(jl_lcm *lcm, long linger_us);
 jl_chan *jl_lcm_tx(jl_lcm *lcm, int node);
 jl_chan *jl_lcm_rx(jl_lcm *lcm, int node);
 
-/* Microseconds since a node was last heard, as far as the last channel call saw;
- * -1 if it is not there (yet), has closed, or has been silent for silence_us.
- * Channels to and from one that has been silent for so long fail with
- * JL_ESILENT, once what came before is fetched. */
+/* Microseconds since a node was last heard, as far as the last channel call
+ * saw; -1 if it is not there (yet) or has closed.  Channels to and from one that
+ * has been silent for silence_us fail with JL_ESILENT, once what came before is
+ * fetched. */
 long jl_lcm_silence(const jl_lcm *lcm, int node);
 
 /* Sum of the counters of all links; `refused` also counts what came from no

@@ -1,10 +1,11 @@
 /* How a PE waits: it looks for a while, then it sleeps until it is woken. */
 #include "threads_parts.h"
 
+#include <sched.h>
 #include <time.h>
 
 #define SPIN_US 20
-#define LOOKS 32                    /* between looks at the clock */
+#define LOOKS 32                    /* at most a microsecond */
 
 #if defined(__x86_64__) || defined(__i386__)
 #define RELAX() __builtin_ia32_pause()
@@ -38,6 +39,8 @@ static int first_ready(jl_chan *const *chans, int n,
     return JL_ETIMEOUT;
 }
 
+/* The other PE may have been put on the same core, where it gets on only if we
+ * let it: hence sched_yield, which returns at once where nobody else is. */
 static int spin(jl_chan *const *chans, int n, int (*ready)(struct end *),
                 tick deadline)
 {
@@ -46,14 +49,15 @@ static int spin(jl_chan *const *chans, int n, int (*ready)(struct end *),
 
     if (deadline < until)
         until = deadline;
-    do
+    do {
         for (i = 0; i < LOOKS; i++) {
             found = first_ready(chans, n, ready);
             if (found >= 0)
                 return found;
             RELAX();
         }
-    while (now_us() < until);
+        sched_yield();
+    } while (now_us() < until);
     return JL_ETIMEOUT;
 }
 

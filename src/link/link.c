@@ -101,8 +101,10 @@ int jl_link_recv(jl_link *link, unsigned char *msg, int cap)
         link->in_slot = (link->in_slot + 1) % link->window;
         link->in_held--;
     } while (kind != JL_FRAME_LAST);
-    /* At half a ring, not at once: the sender will send all it has. */
-    if (link->room_lacked && link->in_held <= link->window / 2) {
+    /* At half a ring, not at once: the sender will send all it has.  But if the
+     * rest of a message is what had no room, there is no more to fetch. */
+    if (link->room_lacked && (link->in_held <= link->window / 2 ||
+                              jl_link_peek(link) < 0)) {
         link->room_lacked = 0;
         link->ask_now = 1;
     }

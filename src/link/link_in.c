@@ -7,6 +7,11 @@ static int refuse(unsigned long *count, int status)
     return status;
 }
 
+/* Of those that ask for the same piece, before it is acknowledged or its time
+ * is out.  A carrier that mixes up what it carries makes for many, and each
+ * brings a whole window onto it. */
+#define ASKS_HEEDED 4
+
 /* frame->ack is the next piece that the other end waits for. */
 static void take_ack(jl_link *link, const jl_frame *frame, jl_u32 now)
 {
@@ -21,9 +26,13 @@ static void take_ack(jl_link *link, const jl_frame *frame, jl_u32 now)
         link->out_slot = (int)((jl_u32)link->out_slot + n) % link->window;
         link->wait_us = link->config.rto_us;
         link->sent_at = now;
+        link->heeded = 0;
     }
-    if (frame->kind == JL_FRAME_ACK && frame->seq == 1)
+    if (frame->kind == JL_FRAME_ACK && frame->seq == 1
+        && link->heeded < ASKS_HEEDED) {
+        link->heeded++;
         link->out_next = link->out_first;       /* asked: do not wait */
+    }
 }
 
 /* Every piece of a message but the last is full, so that a message cannot
@@ -100,7 +109,7 @@ static int meet_stranger(jl_link *link, const jl_frame *frame, int knows_us)
     link->count.stale++;
     if (frame->kind == JL_FRAME_ALIVE && knows_us) {
         link->up = 0;
-        if (link->failed == JL_OK)
+        if (link->failed == JL_OK || jli_unsaid(link))
             link->failed = JL_EPEER;
     } else if (frame->kind == JL_FRAME_HELLO || knows_us) {
         link->doubt = frame->session;
@@ -146,6 +155,8 @@ int jl_link_input(jl_link *link, const unsigned char *datagram, int len,
         link->ack_now = 1;      /* it is not up yet: any frame brings it up */
         return JL_OK;
     }
+    if (!knows_us)
+        link->ack_now = 1;      /* it is up with an earlier session of ours */
     if (!knows_us || frame.kind == JL_FRAME_ALIVE)
         return refuse(&link->count.stale, JL_EPEER);
     jli_heard(link, now);

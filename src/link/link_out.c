@@ -103,6 +103,7 @@ static int next_frame(jl_link *link, unsigned char *datagram, jl_u32 now)
     if (link->out_next != link->out_first &&
         jli_left(link->sent_at, link->wait_us, now) == 0) {
         link->out_next = link->out_first;
+        link->heeded = 0;
         if (link->wait_us < BACKOFF_MAX * link->config.rto_us)
             link->wait_us *= 2;
     }

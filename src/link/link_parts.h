@@ -33,10 +33,20 @@ JL_INLINE int jli_over(const jl_link *link)
     return link->failed != JL_OK && !link->up;
 }
 
-/* A link whose other end has to be heard now and then. */
+/* Does the other end perhaps lack a piece of a message? */
+JL_INLINE int jli_unsaid(const jl_link *link)
+{
+    jl_u32 bye = link->closing ? 1 : 0;
+
+    return jli_ahead(link->out_end, link->out_first) > bye;
+}
+
+/* A link whose other end has to be heard now and then: also one that has closed
+ * and has still to acknowledge what it was sent. */
 JL_INLINE int jli_listens(const jl_link *link)
 {
-    return link->config.silence_us > 0 && link->up && link->failed == JL_OK;
+    return link->config.silence_us > 0 && link->up
+        && (link->failed == JL_OK || jli_unsaid(link));
 }
 
 /* The longest between two calls of jl_link_judge that counts as listening. */

@@ -25,7 +25,7 @@ long jl_link_silence(const jl_link *link, jl_u32 now)
 {
     jl_u32 unheard = jli_ahead(now, link->heard_at);
 
-    if (!link->up || link->failed != JL_OK)
+    if (link->failed != JL_ESILENT && (!link->up || link->failed != JL_OK))
         return -1;
     return unheard < (jl_u32)JL_LINK_MAX_US ? (long)unheard : JL_LINK_MAX_US;
 }

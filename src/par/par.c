@@ -1,5 +1,5 @@
 /* A PE's life: set up, say ready, serve measurements until the stop. */
-#include "par/par_msg.h"
+#include "par/par_parts.h"
 
 #include "mat/mat_k.h"
 
@@ -32,153 +32,80 @@ static int count_active(const unsigned char *owner, int M, int npe)
     return active;
 }
 
+/* The channels of the neighbours can hold the messages. */
+static int channels_hold(const jl_par_config *c, int need)
+{
+    int pe;
+
+    for (pe = 0; pe < c->npe; pe++)
+        if (pe != c->pe
+            && jl_topo_relays(c->topology, c->npe, c->pe, pe) == 0
+            && (c->to[pe]->max_len < need || c->from[pe]->max_len < need))
+            return 0;
+    return c->pe != 0 || c->to_host == NULL || c->to_host->max_len >= need;
+}
+
 int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
                 unsigned char *buf, int cap, int *status, jl_real *z)
 {
-    int pe, need = JL_PAR_MSG(imm->M, imm->n, imm->m), active;
+    jl_par_config copy = *config;
+    int need = JL_PAR_MSG(imm->M, imm->n, imm->m), active;
 
-    if (config->npe < 1 || config->npe > JL_MAX_PES || config->pe < 0
-        || config->pe >= config->npe)
+    if (copy.npe < 1 || copy.npe > JL_MAX_PES || copy.pe < 0
+        || copy.pe >= copy.npe || copy.topology < JL_TOPO_FULL
+        || copy.topology > JL_TOPO_CHAIN
+        || (copy.exchange != JL_EXCHANGE_GATHER
+            && copy.exchange != JL_EXCHANGE_REDUCE))
         return JL_EDIM;
-    active = count_active(config->owner, imm->M, config->npe);
+    active = count_active(copy.owner, imm->M, copy.npe);
     if (active == 0)
         return JL_EDIM;
     if (cap < 2 * need)
         return JL_ENOMEM;
-    for (pe = 0; pe < config->npe; pe++)
-        if (pe != config->pe && (config->to[pe]->max_len < need
-                                 || config->from[pe]->max_len < need))
-            return JL_ETOOLONG;
-    if (config->pe == 0 && config->to_host != NULL
-        && config->to_host->max_len < need)
+    if (copy.topology == JL_TOPO_RING && active < copy.npe)
+        copy.topology = JL_TOPO_CHAIN;
+    if (!channels_hold(&copy, need))
         return JL_ETOOLONG;
     memset(par, 0, sizeof *par);
-    par->config = *config;
+    par->config = copy;
     par->imm = imm;
     par->active = active;
     par->buf = buf;
     par->cap = cap;
     par->status = status;
     par->z = z;
+    jli_par_order(par);
     return JL_OK;
-}
-
-/* --- channels, and whose fault it is ------------------------------------- */
-
-static jl_chan *channel(const jl_par *par, int pe, int sending)
-{
-    const jl_par_config *c = &par->config;
-
-    if (pe == c->npe)
-        return sending ? c->to_host : c->from_host;
-    return sending ? c->to[pe] : c->from[pe];
-}
-
-static int fault(jl_par *par, int pe, int status)
-{
-    par->failed = status;
-    par->failed_pe = pe;
-    return status;
-}
-
-/* Send buf [len] to a PE, or to the host (npe). */
-static int send_to(jl_par *par, int pe, int len, long timeout_us)
-{
-    int status = jl_chan_send(channel(par, pe, 1), par->buf, len, timeout_us);
-
-    return status == JL_OK ? JL_OK : fault(par, pe, status);
-}
-
-/* Receive into buf; returns the length, or the channel's error. */
-static int receive_from(jl_par *par, int pe, long timeout_us)
-{
-    int len = jl_chan_recv(channel(par, pe, 0), par->buf, par->cap,
-                           timeout_us);
-
-    return len >= 0 ? len : fault(par, pe, len);
-}
-
-/* --- ready --------------------------------------------------------------- */
-
-static int send_ready(jl_par *par, int to, jl_u32 fingerprint)
-{
-    const jl_par_config *config = &par->config;
-    int len = jli_msg_plain(par->buf, JLI_READY, config->pe, config->npe,
-                            fingerprint);
-
-    return send_to(par, to, len, config->start_us);
-}
-
-/* Returns JL_OK, JL_EMODEL, or an error. */
-static int receive_ready(jl_par *par, int from)
-{
-    int len = receive_from(par, from, par->config.start_us);
-
-    if (len < 0)
-        return len;
-    if (len != JLI_MSG_HEADER || par->buf[0] != JLI_READY
-        || par->buf[1] != from)
-        return fault(par, from, JL_EMSG);
-    if ((int)jl_get_u16(par->buf + 2) != par->config.npe
-        || jl_get_u32(par->buf + 4) != par->config.fingerprint)
-        return fault(par, from, JL_EMODEL);
-    return JL_OK;
-}
-
-/* PE0 hears of every PE, then tells every PE and the host.  If one has another
- * model, they hear a fingerprint that is nobody's. */
-static int gather_ready(jl_par *par)
-{
-    const jl_par_config *config = &par->config;
-    jl_u32 fingerprint = config->fingerprint;
-    int pe, status, odd = 0;
-
-    for (pe = 1; pe < config->npe; pe++) {
-        status = receive_ready(par, pe);
-        if (status == JL_EMODEL)
-            odd = pe;
-        else if (status != JL_OK)
-            return status;
-    }
-    if (odd > 0)
-        fingerprint = ~fingerprint & (jl_u32)0xFFFFFFFFUL;
-    for (pe = config->npe; pe > 0; pe--) {
-        status = send_ready(par, pe, fingerprint);
-        if (status != JL_OK && odd == 0)
-            return status;
-    }
-    return odd > 0 ? fault(par, odd, JL_EMODEL) : JL_OK;
-}
-
-static int ready(jl_par *par)
-{
-    int status;
-
-    if (par->config.pe == 0)
-        return gather_ready(par);
-    status = send_ready(par, 0, par->config.fingerprint);
-    return status == JL_OK ? receive_ready(par, 0) : status;
 }
 
 /* --- serve --------------------------------------------------------------- */
 
-/* Pass a message of the host's on, from PE0 to PEs 1 .. last-1. */
+static int parent(const jl_par *par)
+{
+    const jl_par_config *config = &par->config;
+
+    return config->pe == 0 ? config->npe
+        : jl_topo_parent(config->topology, config->npe, config->pe);
+}
+
+/* Pass a message of the host's on, down the tree of PEs 0 .. last-1. */
 static int pass_on(jl_par *par, int len, int last)
 {
+    const jl_par_config *config = &par->config;
     int pe, status = JL_OK;
 
-    if (par->config.pe != 0)
-        return JL_OK;
     for (pe = 1; pe < last && status == JL_OK; pe++)
-        status = send_to(par, pe, len, par->config.timeout_us);
+        if (jl_topo_parent(config->topology, config->npe, pe) == config->pe)
+            status = jli_par_send(par, pe, JLI_IN(par), len,
+                                  config->timeout_us, 0);
     return status;
 }
 
-/* Read a measurement from buf, or say why it is refused. */
+/* Read a measurement, or say why it is refused. */
 static int accept_meas(jl_par *par, jl_meas *meas, int len)
 {
     int m = par->imm->m;
-    int status = jli_msg_meas_read(meas, par->z, m, par->buf, len);
+    int status = jli_msg_meas_read(meas, par->z, m, JLI_IN(par), len);
 
     if (status != JL_OK)
         return status;
@@ -196,11 +123,12 @@ static int answer(jl_par *par, jl_u32 seq, int status)
 
     if (par->config.pe != 0)
         return JL_OK;
-    len = jli_msg_estimate(par->buf, par->imm, seq, status);
-    return send_to(par, par->config.npe, len, par->config.timeout_us);
+    len = jli_msg_estimate(JLI_OUT(par), par->imm, seq, status);
+    return jli_par_send(par, par->config.npe, JLI_OUT(par), len,
+                        par->config.timeout_us, 0);
 }
 
-/* One measurement, in buf [len]: refused, or a step.  Returns the error of a
+/* One measurement that came [len]: refused, or a step.  Returns the error of a
  * channel; a failed step is no error here, the host is told. */
 static int serve_meas(jl_par *par, int len, jl_real *scratch)
 {
@@ -218,29 +146,33 @@ static int serve_meas(jl_par *par, int len, jl_real *scratch)
         return status;
     status = jl_par_step(par, &meas, scratch);
     par->steps++;
-    if (par->failed != JL_OK) {
-        int pe = par->failed_pe;
-
-        (void)answer(par, meas.seq, status);
-        return fault(par, pe, status);
-    }
+    if (par->failed != JL_OK)
+        return status;
     status = answer(par, meas.seq, status);
     jl_par_ahead(par, scratch);
     return status;
 }
 
-int jl_par_serve(jl_par *par, jl_real *scratch)
+static int serve(jl_par *par, jl_real *scratch)
 {
-    int from = par->config.pe == 0 ? par->config.npe : 0;
-    int status = ready(par), len;
+    int status = jli_par_ready(par), len;
 
     while (status == JL_OK) {
-        len = receive_from(par, from, JL_FOREVER);
+        len = jli_par_recv(par, parent(par), JL_FOREVER, 0);
         if (len < 0)
             return len;
-        if (len == JLI_MSG_HEADER && par->buf[0] == JLI_STOP)
+        if (len == JLI_MSG_HEADER && JLI_IN(par)[0] == JLI_STOP)
             return pass_on(par, len, par->config.npe);
         status = serve_meas(par, len, scratch);
     }
+    return status;
+}
+
+int jl_par_serve(jl_par *par, jl_real *scratch)
+{
+    int status = serve(par, scratch);
+
+    if (par->failed != JL_OK && par->failed != JL_EMODEL)
+        jli_par_tell_fault(par);
     return status;
 }

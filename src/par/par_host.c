@@ -5,9 +5,12 @@ int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, unsigned char *buf,
                   int cap, long timeout_us)
 {
     int len = jl_chan_recv(from_pe0, buf, cap, timeout_us);
+    int unused, status;
 
     if (len < 0)
         return len;
+    if (jli_msg_fault_read(&unused, &status, JL_MAX_PES, buf, len) == JL_OK)
+        return status;
     if (len != JLI_MSG_HEADER || buf[0] != JLI_READY)
         return JL_EMSG;
     return jl_get_u32(buf + 4) == fingerprint ? JL_OK : JL_EMODEL;
@@ -24,9 +27,15 @@ int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,
 int jl_host_recv(jl_chan *from_pe0, jl_estimate *estimate, int M, int n,
                  unsigned char *buf, int cap, long timeout_us)
 {
-    int len = jl_chan_recv(from_pe0, buf, cap, timeout_us);
+    int len = jl_chan_recv(from_pe0, buf, cap, timeout_us), status;
 
-    return len < 0 ? len : jli_msg_estimate_read(estimate, M, n, buf, len);
+    estimate->failed_pe = -1;
+    if (len < 0)
+        return len;
+    if (jli_msg_fault_read(&estimate->failed_pe, &status, JL_MAX_PES, buf,
+                           len) == JL_OK)
+        return status;
+    return jli_msg_estimate_read(estimate, M, n, buf, len);
 }
 
 int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,

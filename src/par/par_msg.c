@@ -1,5 +1,5 @@
 /* Messages as octets. */
-#include "par/par_msg.h"
+#include "par/par_parts.h"
 
 #include "mat/mat_k.h"
 
@@ -51,13 +51,37 @@ int jli_msg_meas_read(jl_meas *meas, jl_real *z, int m,
 
 /* --- modes --------------------------------------------------------------- */
 
-static int owned(const jl_par *par, int pe)
+static int carried(const jl_par *par, const jl_hop *hop, int j)
+{
+    return JLI_CARRIES(hop, par->config.owner[j], par->active);
+}
+
+/* How many modes a hop carries; and estimates with them: of every mode, or of
+ * every PE, at the place of its first mode. */
+static int count_modes(const jl_par *par, const jl_hop *hop)
 {
     int j, count = 0;
 
     for (j = 0; j < par->imm->M; j++)
-        count += par->config.owner[j] == pe;
+        count += carried(par, hop, j);
     return count;
+}
+
+static int has_estimate(const jl_par *par, int j)
+{
+    int i;
+
+    if (par->config.exchange != JL_EXCHANGE_REDUCE)
+        return 1;
+    for (i = 0; par->config.owner[i] != par->config.owner[j]; i++)
+        ;
+    return i == j;
+}
+
+static int count_estimates(const jl_par *par, const jl_hop *hop)
+{
+    return par->config.exchange == JL_EXCHANGE_REDUCE ? hop->count
+        : count_modes(par, hop);
 }
 
 /* The lower half of a full covariance is not sent: it mirrors the upper. */
@@ -83,50 +107,71 @@ static const unsigned char *get_upper(const unsigned char *p, jl_real *P,
     return p;
 }
 
-int jli_msg_modes(unsigned char *buf, const jl_par *par)
+/* The own pool has a place of its own, for the own modes are still needed. */
+static unsigned char *put_estimate(unsigned char *p, const jl_par *par, int j)
 {
     const jl_imm *imm = par->imm;
-    int j, n = imm->n, pe = par->config.pe;
-    unsigned char *p = buf;
+    int n = imm->n;
+    const jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
 
-    p += jli_msg_plain(buf, JLI_MODES, pe, owned(par, pe), par->seq);
+    if (par->config.exchange == JL_EXCHANGE_REDUCE
+        && par->config.owner[j] == par->config.pe) {
+        x = par->pool;
+        P = x + n;
+    }
+    p = jl_put_reals(p, x, n);
+    return put_upper(p, P, n);
+}
+
+int jli_msg_modes(unsigned char *buf, const jl_par *par, const jl_hop *hop)
+{
+    const jl_imm *imm = par->imm;
+    unsigned char *p = buf;
+    int j;
+
+    p += jli_msg_plain(buf, JLI_MODES, par->config.pe, count_modes(par, hop),
+                       par->seq);
     for (j = 0; j < imm->M; j++)
-        if (par->config.owner[j] == pe) {
+        if (carried(par, hop, j)) {
             jl_put_u16(p, (unsigned)-par->status[j]);
             p += 2;
         }
     for (j = 0; j < imm->M; j++)
-        if (par->config.owner[j] == pe) {
+        if (carried(par, hop, j))
             p = jl_put_reals(p, &imm->l[j], 1);
-            p = jl_put_reals(p, imm->xw + j * n, n);
-            p = put_upper(p, imm->Pw + j * n * n, n);
-        }
+    for (j = 0; j < imm->M; j++)
+        if (carried(par, hop, j) && has_estimate(par, j))
+            p = put_estimate(p, par, j);
     return (int)(p - buf);
 }
 
-int jli_msg_modes_read(jl_par *par, int pe, const unsigned char *buf,
-                       int len)
+int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
+                       const unsigned char *buf, int len)
 {
     jl_imm *imm = par->imm;
-    int j, n = imm->n, count = owned(par, pe);
+    int j, n = imm->n, count = count_modes(par, hop);
 
     if (len < JLI_MSG_HEADER)
         return JL_ELENGTH;
-    if (buf[0] != JLI_MODES || buf[1] != pe
+    if (buf[0] != JLI_MODES || buf[1] != hop->from
         || (int)jl_get_u16(buf + 2) != count
         || jl_get_u32(buf + 4) != par->seq)
         return JL_EMSG;
-    if (len != JLI_MSG_HEADER + count * JL_PAR_MODE(n))
+    if (len != JLI_MSG_HEADER + count * (2 + JL_REAL_OCTETS)
+               + count_estimates(par, hop) * (n + JL_PACKED(n))
+                 * JL_REAL_OCTETS)
         return JL_ELENGTH;
     buf += JLI_MSG_HEADER;
     for (j = 0; j < imm->M; j++)
-        if (par->config.owner[j] == pe) {
+        if (carried(par, hop, j)) {
             par->status[j] = -(int)jl_get_u16(buf);
             buf += 2;
         }
     for (j = 0; j < imm->M; j++)
-        if (par->config.owner[j] == pe) {
+        if (carried(par, hop, j))
             buf = jl_get_reals(buf, &imm->l[j], 1);
+    for (j = 0; j < imm->M; j++)
+        if (carried(par, hop, j) && has_estimate(par, j)) {
             buf = jl_get_reals(buf, imm->xw + j * n, n);
             buf = get_upper(buf, imm->Pw + j * n * n, n);
         }
@@ -170,5 +215,19 @@ int jli_msg_estimate_read(jl_estimate *estimate, int M, int n,
         buf = get_upper(buf, estimate->P, n);
         (void)jl_get_reals(buf, estimate->mu, M);
     }
+    return JL_OK;
+}
+
+/* --- fault --------------------------------------------------------------- */
+
+int jli_msg_fault_read(int *culprit, int *status, int npe,
+                       const unsigned char *buf, int len)
+{
+    if (len != JLI_MSG_HEADER)
+        return JL_ELENGTH;
+    if (buf[0] != JLI_FAULT || buf[1] > npe || jl_get_u16(buf + 2) == 0)
+        return JL_EMSG;
+    *culprit = buf[1];
+    *status = -(int)jl_get_u16(buf + 2);
     return JL_OK;
 }

@@ -7,12 +7,17 @@
  *     READY      pe     npe         fingerprint
  *     MEAS       first  m; 0: lost  seq          dt, z [m]
  *     MODES      pe     count       seq          status (16 bits) [count],
- *                                                (l, x, P packed) [count]
+ *                                                l [count], (x, P packed)
  *     ESTIMATE   -      -status     seq          loglik, x, P packed, mu [M];
  *                                                nothing if status is not 0
  *     STOP       -      -           -
+ *     FAULT      culprit  -status   -
  *
- * What is marked - is 0.  MODES lists the sender's modes in index order.
+ * What is marked - is 0.  READY bears the PE that its numbers are of: a PE
+ * passes on those that differ from its own.  MODES lists, in index order, the
+ * modes of the PEs whose blocks the hop carries; (x, P) follow of each mode, or,
+ * in an all-reduce, the pool of each PE, at the place of its first mode.  FAULT
+ * names the PE (npe: the host) that cannot be gone on with.
  */
 #ifndef JL_PAR_MSG_H
 #define JL_PAR_MSG_H
@@ -27,12 +32,21 @@
 #define jli_msg_estimate jli_msg_estimate_f32
 #define jli_msg_estimate_read jli_msg_estimate_read_f32
 #define jli_msg_plain jli_msg_plain_f32
-#define jli_hop_rounds jli_hop_rounds_f32
-#define jli_hop_partner jli_hop_partner_f32
+#define jli_msg_fault_read jli_msg_fault_read_f32
+#define jli_par_send jli_par_send_f32
+#define jli_par_recv jli_par_recv_f32
+#define jli_par_fault jli_par_fault_f32
+#define jli_par_tell_fault jli_par_tell_fault_f32
+#define jli_par_ready jli_par_ready_f32
+#define jli_par_order jli_par_order_f32
+#define jli_par_exchange jli_par_exchange_f32
+#define jli_pool_own jli_pool_own_f32
+#define jli_pool_merge jli_pool_merge_f32
 #endif
 
 enum {
-    JLI_READY = 1, JLI_MEAS = 2, JLI_MODES = 3, JLI_ESTIMATE = 4, JLI_STOP = 5
+    JLI_READY = 1, JLI_MEAS = 2, JLI_MODES = 3, JLI_ESTIMATE = 4, JLI_STOP = 5,
+    JLI_FAULT = 6
 };
 
 #define JLI_MSG_HEADER 8
@@ -47,19 +61,17 @@ int jli_msg_meas(unsigned char *buf, const jl_meas *meas, int m);
 int jli_msg_meas_read(jl_meas *meas, jl_real *z, int m,
                       const unsigned char *buf, int len);
 
-int jli_msg_modes(unsigned char *buf, const jl_par *par);
-int jli_msg_modes_read(jl_par *par, int pe, const unsigned char *buf,
-                       int len);
+int jli_msg_modes(unsigned char *buf, const jl_par *par, const jl_hop *hop);
+int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
+                       const unsigned char *buf, int len);
 
 int jli_msg_estimate(unsigned char *buf, const jl_imm *imm, jl_u32 seq,
                      int status);
 int jli_msg_estimate_read(jl_estimate *estimate, int M, int n,
                           const unsigned char *buf, int len);
 
-/* The exchange's order: whom PE pe meets in round r of a tournament of n PEs in
- * which each meets each once, or -1: nobody.  In a meeting the PE of lower
- * index sends first. */
-int jli_hop_rounds(int n);
-int jli_hop_partner(int n, int pe, int r);
+/* Whom a FAULT accuses, and of what: JL_OK, JL_EMSG or JL_ELENGTH. */
+int jli_msg_fault_read(int *culprit, int *status, int npe,
+                       const unsigned char *buf, int len);
 
 #endif

@@ -2,7 +2,8 @@
 # The core and its headers compile without a warning as C89, C99 and C11, the
 # public headers also as C++98, everything else as C11; with gcc and clang,
 # for double and for float.  Each header compiles alone, and twice in a file.
-# Environment: BUILD (scratch), GOLDEN (the generated reference cases).
+# Environment: BUILD (scratch), GOLDEN (the generated reference cases), GEN
+# (the generated messages).
 cd "$(dirname "$0")/../.." || exit 1
 build=${BUILD:-build/check}/standards
 mkdir -p "$build" && rm -f "$build"/*
@@ -11,7 +12,7 @@ warn='-pedantic -Wall -Wextra -Wshadow -Wconversion -Wundef -Wdouble-promotion -
 c="$warn -Wstrict-prototypes -Wmissing-prototypes"
 exact='-ffp-contract=off -fno-math-errno'
 core="$c -Wdeclaration-after-statement $exact -Iinclude -Isrc"
-host="-std=c11 -D_GNU_SOURCE $c $exact -Iinclude -Iport -Isim -pthread"
+host="-std=c11 -D_GNU_SOURCE $c $exact -Iinclude -Iport -Isim -I${GEN:-build/gen} -pthread"
 tests="-Isrc -Itests -I${GOLDEN:-build/golden} -DJUMPLINK='\"x\"' -DTOP_DIR='\".\"'"
 
 # alone HEADER INCLUDED_AS: make a file that has it twice and nothing else but

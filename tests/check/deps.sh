@@ -4,14 +4,19 @@
 # password), or say what to install and stop with status 2.
 # Silent when nothing is missing.
 
-# group   package   what must be there: a header, or a program
+# group   package   what must be there: a header, a program, or a part of clang
 needs='
 sim       liblcm-dev                 lcm/lcm.h
+sim       liblcm-bin                 lcm-gen
 sim       libjansson-dev             jansson.h
 sim       gnuplot-nox                gnuplot
 test      libcmocka-dev              cmocka.h
 test      nftables                   /usr/sbin/nft
+test      iproute2                   ip
+fuzz      clang                      clang
+fuzz      libclang-rt-14-dev         clang:fuzzer
 check     binutils                   objdump
+check     spin                       spin
 check     g++                        g++
 check     clang                      clang++
 check     gcc-arm-none-eabi          arm-none-eabi-gcc
@@ -21,6 +26,8 @@ check     libnewlib-arm-none-eabi    arm:math.h
 there() {
     case $1 in
     arm:*) echo "#include <${1#arm:}>" | arm-none-eabi-gcc -E - ;;
+    clang:*) echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' |
+        clang "-fsanitize=${1#clang:}" -x c - -o /dev/null ;;
     *.h) echo "#include <$1>" | ${CC:-cc} -E - ;;
     *) command -v "$1" ;;
     esac >/dev/null 2>&1

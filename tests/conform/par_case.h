@@ -8,20 +8,36 @@
 
 #include "jumplink.h"
 
-#define PAR_M 9                         /* modes at most */
+#define PAR_M 9                         /* modes, usually */
+#define PAR_MOST 16                     /* ... and at most */
 #define PAR_N 4
 #define PAR_Z 2
 #define PAR_STEPS 60
 
+/* What is run, and over which PEs. */
+struct par_shape {
+    int npe, M;
+    int sticky;                 /* a chain that allows the cheap mixing     */
+    const jl_kf_form *form;
+    int topology, exchange;
+    int hangs;                  /* this PE falls asleep ...                 */
+    int hangs_at;               /* ... at this measurement; 0: at once; -1:
+                                   nobody does                              */
+};
+
+#define PAR_ASLEEP_US 1000000000L
+
 /* Every PE builds its own. */
 struct par_bank {
-    jl_mode modes[PAR_M];
-    jl_real mode_mem[PAR_M][JL_MODE_MEM(PAR_N, PAR_Z, PAR_Z)];
-    jl_real mem[JL_IMM_STATE(PAR_M, PAR_N)];
-    jl_real scratch[JL_IMM_SCRATCH(PAR_M, PAR_N, PAR_Z)];
-    jl_real Pi[PAR_M * PAR_M];
-    jl_motion motions[PAR_M];
+    jl_mode modes[PAR_MOST];
+    jl_real mode_mem[PAR_MOST][JL_MODE_MEM(PAR_N, PAR_Z, PAR_Z)];
+    jl_real mem[JL_IMM_STATE(PAR_MOST, PAR_N)];
+    jl_real scratch[JL_IMM_SCRATCH(PAR_MOST, PAR_N, PAR_Z)];
+    jl_real Pi[PAR_MOST * PAR_MOST];
+    jl_motion motions[PAR_MOST];
     jl_imm imm;
+    jl_chan *silent;            /* nothing ever comes here                  */
+    int hangs_at;               /* or -1                                    */
 };
 
 /* What a run gives, step by step. */
@@ -29,7 +45,7 @@ struct par_trace {
     int status[PAR_STEPS];
     jl_real x[PAR_STEPS][PAR_N];
     jl_real P[PAR_STEPS][PAR_N * PAR_N];
-    jl_real mu[PAR_STEPS][PAR_M];
+    jl_real mu[PAR_STEPS][PAR_MOST];
     jl_real loglik[PAR_STEPS];
 };
 
@@ -38,7 +54,7 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
                                  const jl_kf_form *form)
 {
     static const jl_real x0[PAR_N] = { 0, 150, 0, 40 };
-    jl_real x[PAR_M * PAR_N], mu[PAR_M], P[PAR_M * PAR_N * PAR_N];
+    jl_real x[PAR_MOST * PAR_N], mu[PAR_MOST], P[PAR_MOST * PAR_N * PAR_N];
     int i, j;
 
     memset(P, 0, sizeof P);
@@ -67,7 +83,7 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
     }
     assert_int_equal(jl_imm_init(&bank->imm, M, bank->modes, form,
                                  JL_MIX_AUTO, bank->mem,
-                                 JL_IMM_STATE(PAR_M, PAR_N)), 0);
+                                 JL_IMM_STATE(PAR_MOST, PAR_N)), 0);
     assert_int_equal(jl_imm_chain(&bank->imm, bank->Pi), 0);
     assert_int_equal(bank->imm.sticky, sticky || M <= 2);
     assert_int_equal(jl_imm_set(&bank->imm, x, P, mu, bank->scratch), 0);
@@ -79,6 +95,8 @@ static inline int par_prepare(void *context, jl_imm *imm, const jl_meas *meas)
     struct par_bank *bank = context;
     int j, status = JL_OK;
 
+    if ((int)meas->seq == bank->hangs_at)
+        (void)jl_chan_recv(bank->silent, NULL, 0, PAR_ASLEEP_US);
     memset(bank->scratch, 0xff, sizeof bank->scratch);
     if (meas->seq % 10 != 0)
         return JL_OK;
@@ -125,8 +143,8 @@ static inline void par_note(struct par_trace *trace, int k, int status,
 }
 
 /* The reference: jl_imm_step, on one processor. */
-static inline void par_serial(struct par_trace *trace, int M, int sticky,
-                              const jl_kf_form *form)
+static inline void par_serial(struct par_trace *trace,
+                              const struct par_shape *shape)
 {
     static struct par_bank bank;
     jl_real z[PAR_Z];
@@ -134,38 +152,46 @@ static inline void par_serial(struct par_trace *trace, int M, int sticky,
     int k, status;
 
     memset(trace, 0, sizeof *trace);
-    par_bank_init(&bank, M, sticky, form);
+    par_bank_init(&bank, shape->M, shape->sticky, shape->form);
+    bank.hangs_at = -1;
     for (k = 0; k < PAR_STEPS; k++) {
         par_meas(&meas, z, k);
         status = par_prepare(&bank, &bank.imm, &meas);
         if (status == JL_OK)
             status = jl_imm_step(&bank.imm, meas.z, bank.scratch);
         par_note(trace, k, status, bank.imm.xhat, bank.imm.Phat, bank.imm.mu,
-                 bank.imm.loglik, M);
+                 bank.imm.loglik, shape->M);
     }
 }
 
-/* A PE's part; the channels are [npe], the host is the node npe.  Returns what
- * jl_par_serve returns. */
-static inline int par_pe(int pe, int npe, int M, int sticky,
-                         const jl_kf_form *form, jl_chan **to, jl_chan **from)
+/* A PE's part; the channels are [npe + 1], the host is the node npe; of
+ * a PE that hangs, nothing must come on the channel from itself.  Returns what
+ * jl_par_serve returns, and in *blamed, unless that is NULL, whom it blames. */
+static inline int par_pe(int pe, const struct par_shape *shape, jl_chan **to,
+                         jl_chan **from, int *blamed)
 {
     struct par_bank *bank = malloc(sizeof *bank);
-    unsigned char owner[PAR_M], buf[JL_PAR_BUF(PAR_M, PAR_N, PAR_Z)];
-    int mode_status[PAR_M], status;
+    unsigned char owner[PAR_MOST], buf[JL_PAR_BUF(PAR_MOST, PAR_N, PAR_Z)];
+    int mode_status[PAR_MOST], status;
     jl_par_config config = { 0 };
     jl_real z[PAR_Z];
     jl_par par;
 
-    par_bank_init(bank, M, sticky, form);
-    jl_par_deal(owner, M, npe);
+    par_bank_init(bank, shape->M, shape->sticky, shape->form);
+    bank->silent = from[pe];
+    bank->hangs_at = shape->hangs == pe ? shape->hangs_at : -1;
+    if (bank->hangs_at == 0)
+        (void)jl_chan_recv(bank->silent, NULL, 0, PAR_ASLEEP_US);
+    jl_par_deal(owner, shape->M, shape->npe);
     config.pe = pe;
-    config.npe = npe;
+    config.npe = shape->npe;
     config.owner = owner;
+    config.topology = shape->topology;
+    config.exchange = shape->exchange;
     config.to = to;
     config.from = from;
-    config.to_host = to[npe];
-    config.from_host = from[npe];
+    config.to_host = to[shape->npe];
+    config.from_host = from[shape->npe];
     config.prepare = par_prepare;
     config.context = bank;
     config.fingerprint = 7;
@@ -175,16 +201,20 @@ static inline int par_pe(int pe, int npe, int M, int sticky,
                          mode_status, z);
     if (status == JL_OK)
         status = jl_par_serve(&par, bank->scratch);
+    if (blamed != NULL)
+        *blamed = par.failed_pe;
     free(bank);
     return status;
 }
 
-/* The host's part: feed all measurements, note all answers, stop. */
-static inline int par_host(struct par_trace *trace, int M, jl_chan *to,
-                           jl_chan *from)
+/* The host's part: feed all measurements, note all answers, stop.  *blamed as
+ * above, -1 for nobody. */
+static inline int par_host(struct par_trace *trace,
+                           const struct par_shape *shape, jl_chan *to,
+                           jl_chan *from, int *blamed)
 {
-    unsigned char buf[JL_PAR_MSG(PAR_M, PAR_N, PAR_Z)];
-    jl_real x[PAR_N], P[PAR_N * PAR_N], mu[PAR_M], z[PAR_Z];
+    unsigned char buf[JL_PAR_MSG(PAR_MOST, PAR_N, PAR_Z)];
+    jl_real x[PAR_N], P[PAR_N * PAR_N], mu[PAR_MOST], z[PAR_Z];
     jl_estimate estimate = { 0 };
     jl_meas meas;
     int k, status;
@@ -198,13 +228,16 @@ static inline int par_host(struct par_trace *trace, int M, jl_chan *to,
         par_meas(&meas, z, k);
         status = jl_host_send(to, &meas, PAR_Z, buf, sizeof buf, 5000000);
         if (status == JL_OK)
-            status = jl_host_recv(from, &estimate, M, PAR_N, buf, sizeof buf,
-                                  5000000);
+            status = jl_host_recv(from, &estimate, shape->M, PAR_N, buf, sizeof buf,
+                                  60000000);
         if (status == JL_OK && estimate.seq != meas.seq)
             status = JL_EMSG;
         if (status == JL_OK)
-            par_note(trace, k, estimate.status, x, P, mu, estimate.loglik, M);
+            par_note(trace, k, estimate.status, x, P, mu, estimate.loglik,
+                     shape->M);
     }
+    if (blamed != NULL)
+        *blamed = estimate.failed_pe;
     return status == JL_OK ? jl_host_stop(to, buf, sizeof buf, 5000000)
                            : status;
 }

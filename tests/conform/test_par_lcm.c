@@ -14,12 +14,7 @@
 
 static int is_private;
 
-struct run {
-    int npe, M, sticky;
-    const jl_kf_form *form;
-};
-
-static jl_lcm *join(const struct run *run, int node, jl_chan **to,
+static jl_lcm *join(const struct par_shape *shape, int node, jl_chan **to,
                     jl_chan **from)
 {
     jl_lcm_config config = { 0 };
@@ -30,12 +25,12 @@ static jl_lcm *join(const struct run *run, int node, jl_chan **to,
     config.url = URL;
     config.run = "par";
     config.node = node;
-    config.nodes = run->npe + 1;
+    config.nodes = shape->npe + 1;
     config.number = JL_REAL_OCTETS;
     config.max_len = JL_PAR_MSG(PAR_M, PAR_N, PAR_Z);
     config.slots = 2;
     lcm = jl_lcm_open(&config, &why);
-    for (i = 0; lcm != NULL && i <= run->npe; i++) {
+    for (i = 0; lcm != NULL && i <= shape->npe; i++) {
         to[i] = jl_lcm_tx(lcm, i);
         from[i] = jl_lcm_rx(lcm, i);
     }
@@ -43,7 +38,7 @@ static jl_lcm *join(const struct run *run, int node, jl_chan **to,
 }
 
 /* The child's life: a PE; its exit status is 0 if all went well. */
-static void be_pe(const struct run *run, int pe, pid_t parent)
+static void be_pe(const struct par_shape *shape, int pe, pid_t parent)
 {
     jl_chan *to[JL_MAX_PES + 1], *from[JL_MAX_PES + 1];
     int status = JL_EIO;
@@ -53,15 +48,14 @@ static void be_pe(const struct run *run, int pe, pid_t parent)
     alarm(30);
     if (getppid() != parent)
         _exit(1);
-    lcm = join(run, pe, to, from);
+    lcm = join(shape, pe, to, from);
     if (lcm != NULL)
-        status = par_pe(pe, run->npe, run->M, run->sticky, run->form, to,
-                        from);
+        status = par_pe(pe, shape, to, from, NULL);
     jl_lcm_close(lcm, 10000000);
     _exit(status == JL_OK ? 0 : 1);
 }
 
-static void compare(const struct run *run)
+static void compare(const struct par_shape *shape)
 {
     static struct par_trace serial, trace;
     jl_chan *to[JL_MAX_PES + 1], *from[JL_MAX_PES + 1];
@@ -69,17 +63,17 @@ static void compare(const struct run *run)
     int pe, host = JL_EIO, bad = 0, status;
     jl_lcm *lcm;
 
-    par_serial(&serial, run->M, run->sticky, run->form);
-    for (pe = 0; pe < run->npe; pe++) {
+    par_serial(&serial, shape);
+    for (pe = 0; pe < shape->npe; pe++) {
         pid[pe] = fork();
         if (pid[pe] == 0)
-            be_pe(run, pe, parent);
+            be_pe(shape, pe, parent);
     }
-    lcm = join(run, run->npe, to, from);
+    lcm = join(shape, shape->npe, to, from);
     if (lcm != NULL)
-        host = par_host(&trace, run->M, to[0], from[0]);
+        host = par_host(&trace, shape, to[0], from[0], NULL);
     jl_lcm_close(lcm, 10000000);
-    for (pe = 0; pe < run->npe; pe++) {
+    for (pe = 0; pe < shape->npe; pe++) {
         if (host != JL_OK)
             kill(pid[pe], SIGKILL);
         waitpid(pid[pe], &status, 0);
@@ -90,22 +84,25 @@ static void compare(const struct run *run)
     assert_same_bits(&trace, &serial, sizeof serial);
 }
 
-static void test_par_gives_serial_bits_over_lcm(void **state)
+static void test_par_gives_serial_bits_over_lcm_and_topologies(void **state)
 {
-    struct run run = { 0, PAR_M, 0, &jl_kf_joseph };
+    struct par_shape s = { 0, PAR_M, 0, &jl_kf_joseph, 0, 0, 0, -1 };
 
     (void)state;
     if (!is_private)
         skip();
-    for (run.npe = 1; run.npe <= 8; run.npe++)
-        for (run.sticky = 0; run.sticky < 2; run.sticky++)
-            compare(&run);
+    for (s.topology = JL_TOPO_FULL; s.topology <= JL_TOPO_CHAIN;
+         s.topology++)
+        for (s.npe = 1; s.npe <= 8; s.npe++) {
+            s.sticky = s.npe % 2;
+            compare(&s);
+        }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_par_gives_serial_bits_over_lcm),
+        cmocka_unit_test(test_par_gives_serial_bits_over_lcm_and_topologies),
     };
 
     is_private = private_net_enter() == 0;

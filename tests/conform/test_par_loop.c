@@ -6,9 +6,8 @@
 
 struct run {
     jl_loop *loop;
-    int npe, M, sticky;
-    const jl_kf_form *form;
-    int status[JL_MAX_PES + 1];
+    struct par_shape shape;
+    int status[JL_MAX_PES + 1], blamed[JL_MAX_PES + 1];
     struct par_trace trace;
 };
 
@@ -16,18 +15,45 @@ static void body(int node, void *context)
 {
     struct run *run = context;
     jl_chan *to[JL_MAX_PES + 1] = { NULL }, *from[JL_MAX_PES + 1] = { NULL };
-    int i;
+    int i, npe = run->shape.npe;
 
-    for (i = 0; i <= run->npe; i++)
-        if (i != node) {
+    for (i = 0; i <= npe && node <= npe; i++)
+        if (i != node && (i == npe || node == npe
+                          || jl_topo_relays(run->shape.topology, npe, node, i)
+                             == 0)) {
             to[i] = jl_loop_tx(run->loop, node, i);
             from[i] = jl_loop_rx(run->loop, i, node);
         }
-    if (node == run->npe)
-        run->status[node] = par_host(&run->trace, run->M, to[0], from[0]);
+    from[node] = jl_loop_rx(run->loop, npe + 1, node);
+    if (node > npe)
+        (void)jl_chan_recv(jl_loop_rx(run->loop, run->shape.hangs, node),
+                           NULL, 0, PAR_ASLEEP_US);
+    else if (node == npe)
+        run->status[node] = par_host(&run->trace, &run->shape, to[0],
+                                     from[0], &run->blamed[node]);
     else
-        run->status[node] = par_pe(node, run->npe, run->M, run->sticky,
-                                   run->form, to, from);
+        run->status[node] = par_pe(node, &run->shape, to, from,
+                                   &run->blamed[node]);
+}
+
+static void start(struct run *run, int slots)
+{
+    /* the last node does nothing but never send, for a PE to sleep on */
+    run->loop = jl_loop_new(run->shape.npe + 2,
+                            JL_PAR_MSG(PAR_MOST, PAR_N, PAR_Z), slots);
+    assert_non_null(run->loop);
+    assert_int_equal(jl_loop_run(run->loop, body, run), JL_OK);
+    jl_loop_free(run->loop);
+}
+
+static void parallel(struct run *run, int slots)
+{
+    int i;
+
+    start(run, slots);
+    for (i = 0; i <= run->shape.npe; i++)
+        assert_int_equal(run->status[i], JL_OK);
+    assert_int_equal(run->blamed[run->shape.npe], -1);
 }
 
 static void compare(struct run *run, int slots)
@@ -35,51 +61,188 @@ static void compare(struct run *run, int slots)
     static struct par_trace serial;
     int i, failures = 0;
 
-    par_serial(&serial, run->M, run->sticky, run->form);
-    run->loop = jl_loop_new(run->npe + 1, JL_PAR_MSG(PAR_M, PAR_N, PAR_Z),
-                            slots);
-    assert_non_null(run->loop);
-    assert_int_equal(jl_loop_run(run->loop, body, run), JL_OK);
-    for (i = 0; i <= run->npe; i++)
-        assert_int_equal(run->status[i], JL_OK);
-    jl_loop_free(run->loop);
+    par_serial(&serial, &run->shape);
+    parallel(run, slots);
     for (i = 0; i < PAR_STEPS; i++)
         failures += serial.status[i] != JL_OK;
-    if (run->M == PAR_M)
+    if (run->shape.M == PAR_M)
         assert_true(failures > 0);      /* the comparison covers failed steps */
     assert_same_bits(&run->trace, &serial, sizeof serial);
 }
 
-static void test_par_gives_serial_bits_for_any_pes(void **state)
+/* Channels that are rendezvous, that hold one message, and two. */
+static void compare_all(struct run *run)
 {
-    static struct run run;
+    struct par_shape *s = &run->shape;
     int slots, forms;
 
+    for (s->sticky = 0; s->sticky < 2; s->sticky++)
+        for (slots = 0; slots <= 2; slots++)
+            for (forms = 0; forms < 2; forms++) {
+                s->form = forms == 0 ? &jl_kf_joseph : &jl_kf_standard;
+                compare(run, slots);
+            }
+}
+
+static void test_par_gives_serial_bits_for_any_pes_and_topology(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1 } };
+    struct par_shape *s = &run.shape;
+
     (void)state;
-    for (run.npe = 1; run.npe <= 8; run.npe++)
-        for (run.sticky = 0; run.sticky < 2; run.sticky++)
-            for (slots = 0; slots <= 2; slots++)
-                for (forms = 0; forms < 2; forms++) {
-                    run.M = PAR_M;
-                    run.form = forms == 0 ? &jl_kf_joseph : &jl_kf_standard;
-                    compare(&run, slots);
-                }
+    s->M = PAR_M;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 1; s->npe <= 8; s->npe++)
+            compare_all(&run);
+}
+
+static void test_par_gives_serial_bits_on_sixteen_pes(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1 } };
+    struct par_shape *s = &run.shape;
+    int slots;
+
+    (void)state;
+    s->form = &jl_kf_joseph;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->M = 15; s->M <= PAR_MOST; s->M++)
+            for (slots = 0; slots <= 2; slots++) {
+                s->npe = s->M;
+                compare(&run, slots);
+            }
 }
 
 static void test_par_leaves_spare_pes_idle(void **state)
 {
-    static struct run run;
+    static struct run run = { .shape = { .hangs_at = -1 } };
+    struct par_shape *s = &run.shape;
+    int slots;
 
     (void)state;
-    run.form = &jl_kf_joseph;
-    run.npe = JL_MAX_PES;
-    for (run.M = 1; run.M <= 5; run.M += 2)
-        compare(&run, 1);
+    s->form = &jl_kf_joseph;
+    s->npe = JL_MAX_PES;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->M = 1; s->M <= PAR_M; s->M += 2)
+            for (slots = 0; slots < 2; slots++)
+                compare(&run, slots);
+}
+
+/* --- the all-reduce ------------------------------------------------------ */
+
+/* The metric of a reference case: x in sigmas, P by sigmas, mu absolute, the
+ * log-likelihood by 1 + |loglik|.  The limits are those of ordinary cases up
+ * to the outlier, of 1000 sigma; of the last steps, whose measurements are
+ * absurd, only the status is compared. */
+static void assert_close_trace(const struct par_trace *a,
+                               const struct par_trace *b)
+{
+    int k, i, j;
+
+    for (k = 0; k < PAR_STEPS; k++) {
+        double within = JL_REAL_FLOAT ? (k < 25 ? 2e-3 : 1e-1)
+            : (k < 25 ? 1e-11 : 1e-9);
+
+        assert_int_equal(a->status[k], b->status[k]);
+        if (k >= 50)
+            continue;
+        for (i = 0; i < PAR_N; i++) {
+            double sigma = sqrt((double)b->P[k][i * PAR_N + i]);
+
+            assert_close(a->x[k][i], b->x[k][i], within * sigma);
+            for (j = 0; j < PAR_N; j++)
+                assert_close(a->P[k][i * PAR_N + j], b->P[k][i * PAR_N + j],
+                             within * sigma
+                             * sqrt((double)b->P[k][j * PAR_N + j]));
+        }
+        for (j = 0; j < PAR_MOST; j++)
+            assert_close(a->mu[k][j], b->mu[k][j], within);
+        assert_close(a->loglik[k], b->loglik[k],
+                     within * (1 + fabs((double)b->loglik[k])));
+    }
+}
+
+static void test_par_reduce_equals_serial_up_to_rounding(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1 } };
+    static struct par_trace serial, full;
+    struct par_shape *s = &run.shape;
+    int slots;
+
+    (void)state;
+    s->form = &jl_kf_joseph;
+    s->sticky = 1;
+    s->exchange = JL_EXCHANGE_REDUCE;
+    for (s->M = 1; s->M <= PAR_M; s->M += 2)
+        for (s->npe = 1; s->npe <= 8; s->npe++) {
+            par_serial(&serial, s);
+            for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+                 s->topology++)
+                for (slots = 0; slots <= 2; slots++) {
+                    parallel(&run, slots);
+                    assert_close_trace(&run.trace, &serial);
+                    if (s->topology == JL_TOPO_FULL && slots == 0)
+                        full = run.trace;
+                    assert_same_bits(&run.trace, &full, sizeof full);
+                }
+        }
+}
+
+static void test_par_reduce_refuses_a_chain_that_is_not_sticky(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1 } };
+    int k;
+
+    (void)state;
+    run.shape.form = &jl_kf_joseph;
+    run.shape.M = PAR_M;
+    run.shape.npe = 3;
+    run.shape.exchange = JL_EXCHANGE_REDUCE;
+    parallel(&run, 1);
+    for (k = 0; k < PAR_STEPS; k++)
+        assert_int_equal(run.trace.status[k], JL_ECHAIN);
+}
+
+/* --- death ---------------------------------------------------------------- */
+
+/* Whoever hangs, at the start or in a step: all others blame that PE, however
+ * many relays are between, and the host hears that the run is over. */
+static void test_par_blames_the_dead_and_not_the_relay(void **state)
+{
+    static struct run run;
+    struct par_shape *s = &run.shape;
+    int slots, pe;
+
+    (void)state;
+    s->form = &jl_kf_joseph;
+    s->M = PAR_M;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 2; s->npe <= 6; s->npe++)
+            for (s->hangs = 0; s->hangs < s->npe; s->hangs++)
+                for (s->hangs_at = 0; s->hangs_at < 8; s->hangs_at += 7)
+                    for (slots = 0; slots <= 2; slots++) {
+                        start(&run, slots);
+                        for (pe = 0; pe <= s->npe; pe++)
+                            if (pe != s->hangs) {
+                                assert_true(run.status[pe] != JL_OK);
+                                if (pe < s->npe || (s->hangs > 0
+                                                    && s->hangs_at > 0))
+                                    assert_int_equal(run.blamed[pe],
+                                                     s->hangs);
+                            }
+                    }
 }
 
 /* --- what PE0 refuses ---------------------------------------------------- */
 
 #define REFUSALS 9
+
+static const struct par_shape one_pe = {
+    1, 3, 1, &jl_kf_joseph, JL_TOPO_FULL, JL_EXCHANGE_GATHER, 0, -1
+};
 
 struct refusal {
     jl_loop *loop;
@@ -129,7 +292,7 @@ static void refusal_body(int node, void *context)
     to[1 - node] = jl_loop_tx(r->loop, node, 1 - node);
     from[1 - node] = jl_loop_rx(r->loop, 1 - node, node);
     if (node == 0) {
-        r->pe_status = par_pe(0, 1, 3, 1, &jl_kf_joseph, to, from);
+        r->pe_status = par_pe(0, &one_pe, to, from, NULL);
         return;
     }
     assert_int_equal(jl_host_ready(from[0], 7, buf, sizeof buf, 1000000), 0);
@@ -168,6 +331,10 @@ static void test_par_refuses_bad_measurements_with_a_code(void **state)
 
 /* --- ready barrier ------------------------------------------------------- */
 
+static const struct par_shape two_pes = {
+    2, 3, 1, &jl_kf_joseph, JL_TOPO_FULL, JL_EXCHANGE_GATHER, 0, -1
+};
+
 struct barrier {
     jl_loop *loop;
     int status[3];
@@ -186,7 +353,7 @@ static void barrier_body(int node, void *context)
             from[i] = jl_loop_rx(b->loop, i, node);
         }
     if (node == 0)
-        b->status[0] = par_pe(0, 2, 3, 1, &jl_kf_joseph, to, from);
+        b->status[0] = par_pe(0, &two_pes, to, from, NULL);
     else if (node == 1)                 /* has fingerprint 8, the others 7 */
         b->status[1] = jl_chan_send(to[0], hello, 8, 0);
     else
@@ -252,8 +419,12 @@ static void test_par_init_refuses_what_does_not_fit(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_par_gives_serial_bits_for_any_pes),
+        cmocka_unit_test(test_par_gives_serial_bits_for_any_pes_and_topology),
+        cmocka_unit_test(test_par_gives_serial_bits_on_sixteen_pes),
         cmocka_unit_test(test_par_leaves_spare_pes_idle),
+        cmocka_unit_test(test_par_reduce_equals_serial_up_to_rounding),
+        cmocka_unit_test(test_par_reduce_refuses_a_chain_that_is_not_sticky),
+        cmocka_unit_test(test_par_blames_the_dead_and_not_the_relay),
         cmocka_unit_test(test_par_refuses_bad_measurements_with_a_code),
         cmocka_unit_test(test_par_refuses_to_start_with_different_models),
         cmocka_unit_test(test_par_init_refuses_what_does_not_fit),

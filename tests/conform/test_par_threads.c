@@ -1,13 +1,12 @@
 /* The parallel IMM on port threads, where PEs really run at the same time: the
- * serial filter's bits for any number of PEs, whoever is faster. */
+ * serial bits for any number of PEs and any topology, whoever is faster. */
 #include "par_case.h"
 
 #include "threads/port_threads.h"
 
 struct run {
     jl_threads *threads;
-    int npe, M, sticky;
-    const jl_kf_form *form;
+    struct par_shape shape;
     int status[JL_MAX_PES + 1];
     struct par_trace trace;
 };
@@ -16,18 +15,16 @@ static void body(int node, void *context)
 {
     struct run *run = context;
     jl_chan *to[JL_MAX_PES + 1] = { NULL }, *from[JL_MAX_PES + 1] = { NULL };
-    int i;
+    int i, npe = run->shape.npe;
 
-    for (i = 0; i <= run->npe; i++)
+    for (i = 0; i <= npe; i++)
         if (i != node) {
             to[i] = jl_threads_tx(run->threads, node, i);
             from[i] = jl_threads_rx(run->threads, i, node);
         }
-    if (node == run->npe)
-        run->status[node] = par_host(&run->trace, run->M, to[0], from[0]);
-    else
-        run->status[node] = par_pe(node, run->npe, run->M, run->sticky,
-                                   run->form, to, from);
+    run->status[node] = node == npe
+        ? par_host(&run->trace, &run->shape, to[0], from[0], NULL)
+        : par_pe(node, &run->shape, to, from, NULL);
 }
 
 static void compare(struct run *run, int slots)
@@ -35,12 +32,12 @@ static void compare(struct run *run, int slots)
     static struct par_trace serial;
     int i;
 
-    par_serial(&serial, run->M, run->sticky, run->form);
-    run->threads = jl_threads_new(run->npe + 1,
+    par_serial(&serial, &run->shape);
+    run->threads = jl_threads_new(run->shape.npe + 1,
                                   JL_PAR_MSG(PAR_M, PAR_N, PAR_Z), slots);
     assert_non_null(run->threads);
     assert_int_equal(jl_threads_run(run->threads, body, run), JL_OK);
-    for (i = 0; i <= run->npe; i++)
+    for (i = 0; i <= run->shape.npe; i++)
         assert_int_equal(run->status[i], JL_OK);
     jl_threads_free(run->threads);
     assert_same_bits(&run->trace, &serial, sizeof serial);
@@ -48,18 +45,22 @@ static void compare(struct run *run, int slots)
 
 static void test_par_gives_serial_bits_on_threads(void **state)
 {
-    static struct run run;
+    static struct run run = { .shape = { .hangs_at = -1 } };
+    struct par_shape *s = &run.shape;
     int slots, forms;
 
     (void)state;
-    run.M = PAR_M;
-    for (run.npe = 1; run.npe <= 8; run.npe++)
-        for (run.sticky = 0; run.sticky < 2; run.sticky++)
-            for (slots = 0; slots <= 2; slots++)
-                for (forms = 0; forms < 2; forms++) {
-                    run.form = forms == 0 ? &jl_kf_joseph : &jl_kf_standard;
-                    compare(&run, slots);
-                }
+    s->M = PAR_M;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 1; s->npe <= 8; s->npe++)
+            for (s->sticky = 0; s->sticky < 2; s->sticky++)
+                for (slots = 0; slots <= 2; slots++)
+                    for (forms = 0; forms < 2; forms++) {
+                        s->form = forms == 0 ? &jl_kf_joseph
+                                             : &jl_kf_standard;
+                        compare(&run, slots);
+                    }
 }
 
 int main(void)

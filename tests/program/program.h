@@ -116,6 +116,15 @@ static inline void program_free(struct program *p)
     free(p->out);
     free(p->err);
     p->out = p->err = NULL;
+    p->pid = 0;
+}
+
+/* What a failed test left running: ended by its pid, and waited for. */
+static inline void program_kill(struct program *p)
+{
+    if (p->pid > 0 && p->out == NULL)
+        program_end(p, 0);
+    program_free(p);
 }
 
 /* The one run that is looked at; it is freed by the next. */
@@ -174,6 +183,18 @@ static inline void check_refused(const struct program *p, int status,
                  "with %s", status, words);
         program_fail(p, expected);
     }
+}
+
+/* A run that ended too early: status 1, a line that begins with the program's
+ * name and holds `words`, and one that says how many rows are kept. */
+static inline void check_ended(const struct program *p, const char *words)
+{
+    const char *end = strchr(p->err, '\n'), *found = strstr(p->err, words);
+
+    if (p->status != 1 || strncmp(p->err, "jumplink", 8) != 0 || end == NULL
+        || found == NULL || found > end
+        || strstr(end, ": partial: the first ") == NULL)
+        program_fail(p, words);
 }
 
 /* The same octets; says where they differ. */

@@ -134,19 +134,22 @@ static void check_case(const char *name, int n, const char *form,
     free(want);
 }
 
+static const struct {
+    const char *name;
+    int n;
+} cases[] = {
+    { "bank12", 4 }, { "cvca3", 3 }, { "cvct4", 4 }, { "evidence", 2 },
+    { "meannoise", 2 },
+};
+
+#define CASES (sizeof cases / sizeof *cases)
+
 static void test_filter_meets_reference(void **state)
 {
-    static const struct {
-        const char *name;
-        int n;
-    } cases[] = {
-        { "bank12", 4 }, { "cvca3", 3 }, { "cvct4", 4 }, { "evidence", 2 },
-        { "meannoise", 2 },
-    };
     size_t i;
 
     (void)state;
-    for (i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (i = 0; i < CASES; i++) {
         check_case(cases[i].name, cases[i].n, "joseph", &ordinary);
         check_case(cases[i].name, cases[i].n, "standard", &ordinary);
     }
@@ -200,6 +203,64 @@ static void test_filter_writes_17_digits(void **state)
     same_on(port, "4", serial, __VA_ARGS__); \
     same_on(port, "8", serial, __VA_ARGS__); \
 } while (0)
+
+static const char *const topologies[] = { "full", "star", "ring", "chain" };
+
+static void test_filter_parallel_on_every_topology(void **state)
+{
+    const char *model = GOLDEN "bank12/model.json";
+    const char *data = program_head("bank12.csv", GOLDEN "bank12/z.csv", 31);
+    char *serial = filtered(model, data);
+    int t;
+
+    (void)state;
+    for (t = 0; t < 4; t++) {
+        same_for_all_pes("loop", serial, model, data, "--topology",
+                         topologies[t]);
+        same_on("lcm", "5", serial, model, data, "--topology", topologies[t]);
+    }
+    free(serial);
+}
+
+/* The chains of the ordinary cases are all sticky. */
+static void test_filter_all_reduce_meets_serial(void **state)
+{
+    static const char *const pes[] = { "2", "3", "5" };
+#if JL_REAL_FLOAT
+    static const struct tolerance close = { 2e-2, 2e-3, 2e-3, 1e-3 };
+#else
+    static const struct tolerance close = { 1e-11, 1e-11, 1e-11, 1e-11 };
+#endif
+    char model[400], data[400], *serial, *reduced;
+    size_t i;
+    int k;
+
+    (void)state;
+    for (i = 0; i < CASES; i++) {
+        snprintf(model, sizeof model, GOLDEN "%s/model.json", cases[i].name);
+        snprintf(data, sizeof data, GOLDEN "%s/z.csv", cases[i].name);
+        serial = filtered(model, data);
+        for (k = 0; k < 12; k++) {
+            reduced = filtered(model, data, "--port", "loop", "--pes",
+                               pes[k % 3], "--topology", topologies[k / 3],
+                               "--exchange", "reduce");
+            check_close(reduced, serial, cases[i].n, &close);
+            free(reduced);
+        }
+        free(serial);
+    }
+}
+
+static void test_filter_all_reduce_refuses_other_chains(void **state)
+{
+    (void)state;
+    run_jumplink("filter", DATA "eight_modes.json", DATA
+                 "carrier_held_1hz.csv", "--z", "east_m,north_m", "--port",
+                 "loop", "--exchange", "reduce");
+    assert_int_equal(ran.status, 1);
+    assert_non_null(strstr(ran.err, "carrier_held_1hz.csv:3: the step fails: "
+                           "the chain is not diag(lambda) + 1 v'"));
+}
 
 static void test_filter_parallel_sticky_chain(void **state)
 {
@@ -619,25 +680,38 @@ static void test_filter_output_that_cannot_be_written(void **state)
     check_refused(&ran, 1, "/dev/full|No space");
 }
 
-/* A step that fails: one line, and no file, or the old one as it was. */
+/* A step that fails: a line that says why and one about what is kept; no file,
+ * or the old one as it was; and beside it what was done before. */
+static void check_step_failed(const char *where, const char *partial)
+{
+    check_ended(&ran, where);
+    check_ended(&ran, "step fails");
+    assert_non_null(strstr(ran.err, "partial: the first 2 of 4 rows"));
+    assert_int_equal(table_count(ran.err, '\n'), 2);
+    assert_non_null(strstr(partial, "# partial: 2 of 4 rows\n"));
+    assert_int_equal(table_count(partial, '\n'), 4);
+}
+
 #define check_step_fails(where, ...) do { \
     int before_ = scratch_count(); \
     const char *path_ = scratch_path("unborn.csv"); \
-    char *old_; \
+    char *old_, *partial_; \
     run_jumplink("filter", __VA_ARGS__, "-o", path_); \
-    check_refused(&ran, 1, where "|step fails"); \
     assert_null(scratch_read(path_)); \
+    partial_ = program_file(scratch_path("unborn.csv.partial")); \
+    check_step_failed(where, partial_); \
+    assert_string_equal(ran.out, ""); \
+    assert_int_equal(remove(scratch_path("unborn.csv.partial")), 0); \
     assert_int_equal(scratch_count(), before_); \
     path_ = scratch_write("kept.csv", "old\n"); \
-    before_ = scratch_count(); \
     run_jumplink("filter", __VA_ARGS__, "-o", path_); \
-    check_refused(&ran, 1, where "|step fails"); \
+    check_step_failed(where, partial_); \
     old_ = program_file(path_); \
     assert_string_equal(old_, "old\n"); \
     free(old_); \
-    assert_int_equal(scratch_count(), before_); \
+    free(partial_); \
     run_jumplink("filter", __VA_ARGS__); \
-    check_refused(&ran, 1, where "|step fails"); \
+    check_step_failed(where, ran.out); \
 } while (0)
 
 static void test_filter_step_that_fails(void **state)
@@ -793,9 +867,10 @@ static void test_help_names_every_option(void **state)
     } helps[] = {
         { NULL, "sim filter host pe --help --version" },
         { "sim", "--data --model --out -o --pes --port --filter --mode --form "
-                 "--hold --z --time --timeout --lcm-url" },
+                 "--hold --z --time --timeout --lcm-url --run --input --idle" },
         { "filter", "MODEL.json DATA.csv --out -o --filter --mode --form "
-                    "--hold --z --time --port --pes --timeout --lcm-url" },
+                    "--hold --z --time --port --pes --timeout --lcm-url "
+                    "--run" },
         { "host", "MODEL.json DATA.csv --out -o --filter --mode --form --hold "
                   "--z --time --pes --run --timeout --start --lcm-url" },
         { "pe", "--pe --pes --model --run --timeout --start --lcm-url "
@@ -818,6 +893,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_filter_meets_reference),
         cmocka_unit_test(test_filter_writes_17_digits),
+        cmocka_unit_test(test_filter_parallel_on_every_topology),
+        cmocka_unit_test(test_filter_all_reduce_meets_serial),
+        cmocka_unit_test(test_filter_all_reduce_refuses_other_chains),
         cmocka_unit_test(test_filter_parallel_sticky_chain),
         cmocka_unit_test(test_filter_parallel_general_chain),
         cmocka_unit_test(test_filter_parallel_kf),

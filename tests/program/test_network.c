@@ -1,6 +1,6 @@
-/* Runs over LCM: PEs and host started by hand, PEs that are missing, wrong or
- * killed, and machines that allow no private network.  All of it in a network
- * of the test's own. */
+/* Runs over LCM: PEs and host started by hand, PEs that are missing or wrong,
+ * and machines that allow no private network.  All of it in a network of the
+ * test's own. */
 #include "close.h"
 #include "scratch.h"
 #include "program.h"
@@ -9,51 +9,30 @@
 #include <sched.h>
 
 #include "jumplink/config.h"
-#include "private_net.h"
+#include "own_net.h"
 
 #define DATA TOP_DIR "/sim/data/"
-#define URL "udpm://239.255.76.67:7667?ttl=0"
 #define LEAVING 15              /* seconds; 1 to 4 unless the machine is busy */
 #define FLIGHT "--z", "east_m,north_m"
-#define BY_HAND "--pes", "2", "--lcm-url", URL, PATIENTLY
+#define BY_HAND "--pes", "2", "--lcm-url", OWN_NET_URL, PATIENTLY
 #define PATIENTLY "--timeout", "20"     /* on a machine that is busy */
 #define IN_VAIN "--start", "1.5"        /* where somebody does not come */
 
-static char data[400], two[400], eight[400], endless[400];
+static char data[400], two[400], eight[400];
 static char *serial;            /* the estimates of data by two */
-static int private_net;
 
 static void keep(char *to, const char *path)
 {
     snprintf(to, 400, "%s", path);
 }
 
-/* A record that takes long enough to be killed in. */
-static void write_endless(void)
-{
-    FILE *stream;
-    int k;
-
-    keep(endless, scratch_path("endless.csv"));
-    stream = fopen(endless, "w");
-    scratch_must(stream != NULL, endless);
-    fputs("t_s,z0,z1\n", stream);
-    for (k = 0; k < 50000; k++)
-        fprintf(stream, "%d,%d,%d\n", k, 10 * k, k % 7);
-    scratch_must(fclose(stream) == 0, endless);
-}
-
 static int setup(void **state)
 {
     scratch_setup(state);
-    private_net = private_net_enter() == 0;
-    if (!private_net)
-        print_message("no private network is allowed here: %s\n",
-                      strerror(errno));
+    own_net_enter();
     keep(data, program_head("flight.csv", DATA "carrier_held_1hz.csv", 201));
     keep(two, program_copy("two_modes.json", DATA "two_modes.json"));
     keep(eight, program_copy("eight_modes.json", DATA "eight_modes.json"));
-    write_endless();
     run_jumplink("filter", two, data, FLIGHT);
     scratch_must(ran.status == 0, "jumplink filter");
     serial = ran.out;
@@ -67,11 +46,6 @@ static int teardown(void **state)
     free(serial);
     return scratch_teardown(state);
 }
-
-#define needs_private_net() do { \
-    if (!private_net) \
-        skip(); \
-} while (0)
 
 /* --- by hand ------------------------------------------------------------- */
 
@@ -122,7 +96,7 @@ static void test_network_by_hand_in_any_order(void **state)
     size_t i, k;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     for (i = 0; i < sizeof orders / sizeof *orders; i++) {
         struct program p[3];
 
@@ -141,7 +115,7 @@ static void test_network_two_runs_at_once(void **state)
     int i;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     for (i = 0; i < 3; i++) {
         start(&a[i], "01h"[i], "one");
         start(&b[i], "h10"[i], "other_1");
@@ -157,7 +131,7 @@ static void test_network_waits_for_the_others(void **state)
     struct program host, pe;
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     program_start(&host, "host", two, data, FLIGHT, BY_HAND, "--timeout",
                   "0.2");
     program_start(&pe, "pe", "--pe", "0", "--model", two, BY_HAND,
@@ -192,7 +166,7 @@ static void free_three(struct program *p)
     check_nobody_left();
 }
 
-#define DIFFERENT "different models, filters or forms"
+#define DIFFERENT "different models, filters, forms or topologies"
 
 /* A host and two PEs of which the second has other arguments: all refuse. */
 static void check_mismatch_told(const char *const *told)
@@ -205,7 +179,7 @@ static void check_mismatch_told(const char *const *told)
     end_three(p);
     check_refused(&p[0], 1, "does not start|" DIFFERENT);
     check_refused(&p[1], 1, "PE0: not like PE1: |" DIFFERENT);
-    check_refused(&p[2], 1, "PE1: not like PE0: |" DIFFERENT);
+    check_refused(&p[2], 1, "PE1: not like the others: |" DIFFERENT);
     free_three(p);
 }
 
@@ -216,7 +190,7 @@ static void check_mismatch_told(const char *const *told)
 static void test_network_different_pes_are_refused(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     check_mismatch("--model", eight);
     check_mismatch("--model", two, "--form", "standard");
     check_mismatch("--model", two, "--filter", "kf", "--mode", "1");
@@ -228,7 +202,7 @@ static void test_network_host_with_another_model(void **state)
     struct program p[3];
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     start(&p[0], '0', "host");
     start(&p[1], '1', "host");
     program_start(&p[2], "host", eight, data, FLIGHT, BY_HAND, "--run",
@@ -271,7 +245,7 @@ static void test_network_pe_with_another_type_of_number(void **state)
     struct program p[3];
 
     (void)state;
-    needs_private_net();
+    needs_own_net();
     program_start(&p[0], "host", two, data, FLIGHT, BY_HAND, "--start", "3");
     program_start(&p[1], "pe", "--pe", "0", "--model", two, BY_HAND, "--start",
                   "3");
@@ -306,7 +280,7 @@ static void check_missing(const char *there, const char *words)
 static void test_network_missing_pe(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     check_missing("0", "PE0: no word from PE1");
     check_missing("1", "PE1: no word from PE0");
 }
@@ -314,104 +288,10 @@ static void test_network_missing_pe(void **state)
 static void test_network_host_alone(void **state)
 {
     (void)state;
-    needs_private_net();
+    needs_own_net();
     run_jumplink("host", two, data, FLIGHT, BY_HAND, IN_VAIN);
     check_refused(&ran, 1, "does not start");
     assert_true(ran.seconds < LEAVING);
-}
-
-/* --- a PE that dies ------------------------------------------------------ */
-
-/* How often a process has waited for something. */
-static long waits(pid_t pid)
-{
-    static const char name[] = "voluntary_ctxt_switches:";
-    char path[60], line[200];
-    long count = 0;
-    FILE *stream;
-
-    snprintf(path, sizeof path, "/proc/%ld/status", (long)pid);
-    stream = fopen(path, "r");
-    while (stream != NULL && fgets(line, sizeof line, stream) != NULL)
-        if (strncmp(line, name, sizeof name - 1) == 0)
-            count = atol(line + sizeof name - 1);
-    if (stream != NULL)
-        fclose(stream);
-    return count;
-}
-
-/* A PE of the program, in the midst of its work: it has waited for more
- * messages than there are at the start. */
-static pid_t working_pe(const struct program *p, const char *which)
-{
-    double deadline = p->began + PROGRAM_LIMIT;
-    char words[20];
-    pid_t pid = 0;
-
-    snprintf(words, sizeof words, " pe --pe %s ", which);
-    while ((program_find(words, scratch_dir, &pid) == 0 || waits(pid) < 500)
-           && program_now() < deadline)
-        program_sleep(0.01);
-    assert_true(program_now() < deadline);
-    return pid;
-}
-
-/* Send PE `which` of a filter a signal in mid-run: one line, with `words`, and
- * nothing left. */
-static void check_pe_ends(const char *which, int number, const char *timeout,
-                          const char *words)
-{
-    struct program p;
-    char out[400];
-    int before = scratch_count();
-    double signalled;
-
-    keep(out, scratch_path("killed.csv"));
-    program_start(&p, "filter", eight, endless, "--port", "lcm", "--out", out,
-                  "--timeout", timeout);
-    kill(working_pe(&p, which), number);
-    signalled = program_now();
-    program_end(&p, PROGRAM_LIMIT);
-    check_refused(&p, 1, words);
-    assert_true(program_now() - signalled < LEAVING);
-    assert_int_equal(scratch_count(), before);
-    program_free(&p);
-    check_nobody_left();
-}
-
-/* This is seen, and does not take until the timeout. */
-static void test_network_killed_pe(void **state)
-{
-    (void)state;
-    check_pe_ends("0", SIGKILL, "20", "PE0 was ended by signal 9");
-    check_pe_ends("1", SIGKILL, "20", "PE1 was ended by signal 9");
-    check_pe_ends("3", SIGKILL, "20", "PE3 was ended by signal 9");
-}
-
-/* One that only stops answering is not waited for longer than the timeout,
- * and is gone afterwards. */
-static void test_network_stopped_pe(void **state)
-{
-    (void)state;
-    check_pe_ends("2", SIGSTOP, "3", "no word from PE2");
-}
-
-/* The PEs do not outlive a program that is killed. */
-static void test_network_killed_filter(void **state)
-{
-    struct program p;
-    int before = scratch_count();
-
-    (void)state;
-    program_start(&p, "filter", eight, endless, "--port", "lcm", "--out",
-                  scratch_path("killed.csv"), PATIENTLY);
-    (void)working_pe(&p, "3");
-    kill(p.pid, SIGKILL);
-    program_end(&p, PROGRAM_LIMIT);
-    assert_int_equal(p.status, 128 + SIGKILL);
-    check_nobody_left();
-    assert_int_equal(scratch_count(), before);
-    program_free(&p);
 }
 
 /* --- without private networks -------------------------------------------- */
@@ -559,9 +439,6 @@ int main(void)
         cmocka_unit_test(test_network_pe_with_another_type_of_number),
         cmocka_unit_test(test_network_missing_pe),
         cmocka_unit_test(test_network_host_alone),
-        cmocka_unit_test(test_network_killed_pe),
-        cmocka_unit_test(test_network_stopped_pe),
-        cmocka_unit_test(test_network_killed_filter),
         cmocka_unit_test(test_network_falls_back_to_the_machines_own),
         cmocka_unit_test(test_network_without_multicast),
         cmocka_unit_test(test_network_wrong_use),

@@ -445,6 +445,34 @@ static void test_link_peer_restarts(void **state)
     }
 }
 
+/* An end that answers a HELLO of the new life, and then is brought up by a
+ * late one of the old: the new life is up and silent, and must make it ask. */
+static void test_link_late_hello_of_an_old_life(void **state)
+{
+    unsigned char out[JL_FRAME_MAX], late[JL_FRAME_MAX];
+    jl_link *l0 = &w.e[0].link, *l1 = &w.e[1].link;
+    int len;
+
+    (void)state;
+    begin(clean, 1);
+    len = jl_link_output(l0, out, JL_FRAME_MAX, w.now);
+    assert_int_equal(jl_link_input(l1, out, len, w.now), JL_OK);
+    assert_int_equal(jl_link_output(l1, late, JL_FRAME_MAX, w.now), 36);
+    start(1, 0x3333);
+    len = jl_link_output(l1, out, JL_FRAME_MAX, w.now);
+    assert_int_equal(jl_link_input(l0, out, len, w.now), JL_OK);
+    len = jl_link_output(l0, out, JL_FRAME_MAX, w.now);
+    assert_int_equal(jl_link_input(l1, out, len, w.now), JL_OK);
+    assert_int_equal(l1->up, 1);
+    assert_true(jl_link_output(l1, out, JL_FRAME_MAX, w.now) > 0);  /* lost */
+    assert_int_equal(jl_link_input(l0, late, 36, w.now), JL_OK);
+    assert_int_equal(l0->up, 1);
+    goals(1, 0);
+    run(NULL, SECONDS(1));
+    assert_int_equal(w.e[0].told, JL_EPEER);
+    assert_int_equal(w.e[1].got, 0);
+}
+
 /* What had wholly arrived before the restart is still fetched. */
 static void test_link_restart_drains(void **state)
 {
@@ -663,6 +691,33 @@ static void test_link_hello_repeats(void **state)
     assert_int_equal(jl_link_timer(l, w.now), 20000);
 }
 
+/* Room is told sooner than at half a ring when all that is left is a message
+ * whose rest had no room. */
+static void test_link_room_for_the_rest(void **state)
+{
+    unsigned char out[JL_FRAME_MAX];
+    jl_link *l = &w.e[1].link;
+    jl_link_config c = config(11, 10, 0x2222);
+    jl_u32 i;
+
+    (void)state;
+    begin(clean, 1);
+    c.slots = 1;
+    assert_int_equal(jl_link_init(l, &c, w.e[1].mem, MEM, w.now), JL_OK);
+    assert_int_equal(l->window, 3);
+    assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, 0, 0, 4), JL_OK);
+    for (i = 1; i < 3; i++)
+        assert_int_equal(forge(JL_FRAME_DATA, 0x1111, 0x2222, i, 0,
+                               JL_FRAME_PAYLOAD), JL_OK);
+    assert_int_equal(forge(JL_FRAME_LAST, 0x1111, 0x2222, 3, 0, 4), JL_EAGAIN);
+    while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
+        assert_int_equal(jl_get_u32(out + 16), 0);
+    assert_int_equal(jl_link_recv(l, msg, MAX_LEN), 4);
+    assert_int_equal(jl_link_output(l, out, JL_FRAME_MAX, w.now), 36);
+    assert_int_equal(jl_get_u32(out + 16), 1);
+    assert_int_equal(jl_get_u32(out + 20), 3);
+}
+
 /* Room is told once, when half of the ring is free. */
 static void test_link_room_at_half(void **state)
 {
@@ -817,6 +872,38 @@ static void test_link_mends_a_loss_at_once(void **state)
     assert_true(idle());
 }
 
+/* However often the same piece is asked for, it is sent again a few times only,
+ * until it is acknowledged or its time is out. */
+static void test_link_heeds_few_asks(void **state)
+{
+    unsigned char out[JL_FRAME_MAX];
+    jl_link *l = &w.e[1].link;
+    int round, asked, sent;
+
+    (void)state;
+    up();
+    for (round = 0; round < 3; round++) {
+        assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
+        for (asked = sent = 0; asked < 20; asked++) {
+            while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
+                sent++;
+            forge(JL_FRAME_ACK, 0x1111, 0x2222, 1, (jl_u32)round, 0);
+        }
+        assert_in_range(sent, 3, 6);
+        if (round == 1) {               /* its time is out */
+            w.now += (jl_u32)jl_link_timer(l, w.now);
+            sent = 0;
+            while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
+                sent++;
+            forge(JL_FRAME_ACK, 0x1111, 0x2222, 1, (jl_u32)round, 0);
+            while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
+                sent++;
+            assert_int_equal(sent, 2);
+        }
+        forge(JL_FRAME_ACK, 0x1111, 0x2222, 0, (jl_u32)round + 1, 0);
+    }
+}
+
 /* --- beat and silence ---------------------------------------------------- */
 
 /* Both ends up at w.now; end 1 with these times. */
@@ -926,7 +1013,7 @@ static void test_link_notices_silence(void **state)
         assert_false(listens_in_vain(999));
         assert_true(listens_in_vain(1));
         /* it is over, but for what had wholly arrived */
-        assert_int_equal(jl_link_silence(l, w.now), -1);
+        assert_int_equal(jl_link_silence(l, w.now), 80000);
         assert_int_equal(jl_link_judge(l, w.now), JL_ESILENT);
         assert_int_equal(jl_link_send(l, msg, 1), JL_ESILENT);
         assert_int_equal(jl_link_recv(l, msg, MAX_LEN), 4);
@@ -975,6 +1062,7 @@ static void test_link_hears(void **state)
 /* An end that was stopped for long, or comes seldom, has not listened. */
 static void test_link_absence_is_not_silence(void **state)
 {
+    unsigned char out[JL_FRAME_MAX];
     jl_link *l = &w.e[1].link;
     int i;
 
@@ -1005,6 +1093,17 @@ static void test_link_absence_is_not_silence(void **state)
     assert_false(listens_in_vain(SECONDS(9)));
     assert_int_equal(jl_link_silence(l, w.now), -1);
     assert_int_equal(jl_link_recv(l, msg, MAX_LEN), JL_ECLOSED);
+    /* ... but not while it owes us an acknowledgement */
+    up_with(0, 80000);
+    assert_int_equal(jl_link_send(l, msg, 1), JL_OK);
+    assert_int_equal(forge(JL_FRAME_BYE, 0x1111, 0x2222, 0, 0, 0), JL_OK);
+    for (i = 1; i <= 80; i++) {
+        while (jl_link_output(l, out, JL_FRAME_MAX, w.now) > 0)
+            ;
+        w.now += 1000;
+        assert_int_equal(jl_link_judge(l, w.now), i < 80 ? JL_OK : JL_ESILENT);
+    }
+    assert_true(jl_link_idle(l));
     /* one that never came is not silent either */
     begin(clean, 1);
     l->config.silence_us = 80000;
@@ -1230,6 +1329,18 @@ static void test_link_restart_after_close(void **state)
     assert_int_equal(jl_link_recv(&w.e[1].link, msg, MAX_LEN), JL_ECLOSED);
     assert_int_equal(jl_link_idle(&w.e[1].link), 1);
     assert_int_equal(jl_link_timer(&w.e[1].link, w.now), -1);
+
+    up();                       /* but not if something never arrived */
+    assert_int_equal(jl_link_send(&w.e[1].link, msg, 1), JL_OK);
+    w.c.lose = 100;
+    act(1);
+    w.c.lose = 0;
+    w.e[0].close = 1;
+    act(0);
+    start(0, 0x3333);
+    run(NULL, SECONDS(1));
+    assert_int_equal(w.e[0].got, 0);
+    assert_int_equal(jl_link_recv(&w.e[1].link, msg, MAX_LEN), JL_EPEER);
 }
 
 static void test_link_acknowledges_in_time(void **state)
@@ -1430,16 +1541,19 @@ int main(void)
         cmocka_unit_test(test_link_room_is_told),
         cmocka_unit_test(test_link_starts_in_any_order),
         cmocka_unit_test(test_link_peer_restarts),
+        cmocka_unit_test(test_link_late_hello_of_an_old_life),
         cmocka_unit_test(test_link_restart_drains),
         cmocka_unit_test(test_link_restarts_settle),
         cmocka_unit_test(test_link_replay_of_a_session),
         cmocka_unit_test(test_link_replay_of_itself),
         cmocka_unit_test(test_link_hello_to_an_up_link),
         cmocka_unit_test(test_link_hello_repeats),
+        cmocka_unit_test(test_link_room_for_the_rest),
         cmocka_unit_test(test_link_room_at_half),
         cmocka_unit_test(test_link_asks_for_the_missing),
         cmocka_unit_test(test_link_does_not_ask_without_room),
         cmocka_unit_test(test_link_mends_a_loss_at_once),
+        cmocka_unit_test(test_link_heeds_few_asks),
         cmocka_unit_test(test_link_beats),
         cmocka_unit_test(test_link_notices_silence),
         cmocka_unit_test(test_link_hears),

@@ -1,0 +1,54 @@
+/* What the files of the parallel filter share. */
+#ifndef JL_PAR_PARTS_H
+#define JL_PAR_PARTS_H
+
+#include "par/par_msg.h"
+
+/* Messages go out of the first half of the buffer and come into the second. */
+#define JLI_OUT(par) ((par)->buf)
+#define JLI_IN(par) ((par)->buf + (par)->cap / 2)
+
+/* 1 if PE pe's block is among those of the hop. */
+#define JLI_CARRIES(hop, pe, npe) \
+    (((pe) - (hop)->first + (npe)) % (npe) < (hop)->count)
+
+/* --- par_fault.c: channels, and whose fault it is ------------------------ */
+
+/* A message to or from a PE, or the host (npe).  Return JL_OK or, for recv, the
+ * length of what is now in JLI_IN; else a code that is also in par->failed,
+ * with par->failed_pe: of this channel, or what the other end tells of another.
+ * The deadline is the later, the more levels of messages must come before. */
+int jli_par_send(jl_par *par, int pe, const unsigned char *msg, int len,
+                 long timeout_us, int level);
+int jli_par_recv(jl_par *par, int pe, long timeout_us, int level);
+
+int jli_par_fault(jl_par *par, int pe, int status);
+
+/* Tell the neighbours, and PE0 the host, of the failure in *par. */
+void jli_par_tell_fault(jl_par *par);
+
+/* --- par_ready.c ---------------------------------------------------------- */
+
+/* All are there, and agree on the model: JL_OK on all of them and the host, or
+ * JL_EMODEL, or the error of a channel. */
+int jli_par_ready(jl_par *par);
+
+/* --- par_exchange.c ------------------------------------------------------- */
+
+/* List the own hops; then, where channels have room, send what does not depend
+ * on what is received before it is received. */
+void jli_par_order(jl_par *par);
+
+/* l, x, P and the status of all modes, or pools, to all active PEs.  Returns
+ * JL_OK, or the error of a channel. */
+int jli_par_exchange(jl_par *par);
+
+/* --- par_pool.c: the all-reduce ------------------------------------------- */
+
+/* The pool of the own modes into par->pool, before they are weighed. */
+void jli_pool_own(jl_par *par);
+
+/* All pools into xhat and Phat, after all modes are weighed. */
+void jli_pool_merge(jl_par *par);
+
+#endif
