@@ -147,9 +147,19 @@ void crew_leave(jl_lcm *lcm, struct crew_node *node, int failed)
 
 /* --- the parallel filter ------------------------------------------------- */
 
+static struct par_shape shape_of(int sticky)
+{
+    struct par_shape shape = { CREW_PES, PAR_M, 0, &jl_kf_joseph,
+                               JL_TOPO_FULL, 0, 0, -1 };
+
+    shape.sticky = sticky;
+    return shape;
+}
+
 static void live_in_filter(const char *run, int which, int sticky,
                            jl_u32 rto_us, const fault_set *set, struct crew_node *node)
 {
+    struct par_shape shape = shape_of(sticky);
     jl_chan *to[CREW_PES + 1], *from[CREW_PES + 1];
     jl_lcm *lcm = crew_join(run, which, CREW_PES + 1,
                             JL_PAR_MSG(PAR_M, PAR_N, PAR_Z), rto_us, set,
@@ -162,10 +172,9 @@ static void live_in_filter(const char *run, int which, int sticky,
     }
     node->seconds = -crew_clock();
     if (which == CREW_PES)
-        status = par_host(&node->trace, PAR_M, to[0], from[0]);
+        status = par_host(&node->trace, &shape, to[0], from[0], NULL);
     else
-        status = par_pe(which, CREW_PES, PAR_M, sticky, &jl_kf_joseph, to,
-                        from);
+        status = par_pe(which, &shape, to, from, NULL);
     node->seconds += crew_clock();
     if (status != JL_OK)
         fprintf(stderr, "%s: node %d: %s\n", run, which,
@@ -188,7 +197,8 @@ void crew_start_filter(pid_t *child, const char *run, int sticky,
 const struct par_trace *crew_serial(int sticky)
 {
     static struct par_trace trace;
+    struct par_shape shape = shape_of(sticky);
 
-    par_serial(&trace, PAR_M, sticky, &jl_kf_joseph);
+    par_serial(&trace, &shape);
     return &trace;
 }

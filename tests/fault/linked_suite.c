@@ -179,7 +179,7 @@ void linked_suite_conforms(const linked_port *over)
 /* --- the parallel filter ------------------------------------------------- */
 
 struct filter {
-    int sticky;
+    struct par_shape shape;
     struct par_trace trace;
 };
 
@@ -194,10 +194,10 @@ static int live_in_filter(int node, void *context)
         from[i] = linked_rx(w.linked[node], i);
     }
     if (node == PAR_PES)
-        status = par_host(&filter->trace, PAR_M, to[0], from[0]);
+        status = par_host(&filter->trace, &filter->shape, to[0], from[0],
+                          NULL);
     else
-        status = par_pe(node, PAR_PES, PAR_M, filter->sticky, &jl_kf_joseph,
-                        to, from);
+        status = par_pe(node, &filter->shape, to, from, NULL);
     if (status != JL_OK)
         print_error("%s: node %d: %s\n", w.set->name, node,
                     jl_status_text(status));
@@ -207,18 +207,22 @@ static int live_in_filter(int node, void *context)
 void linked_suite_gives_serial_bits(const linked_port *over)
 {
     static struct par_trace serial[2];
+    static const struct par_shape shape = {
+        PAR_PES, PAR_M, 0, &jl_kf_joseph, JL_TOPO_FULL, 0, 0, -1
+    };
     static struct filter filter;
-    int s;
+    int *sticky = &filter.shape.sticky, s;
 
     w.over = over;
-    for (s = 0; s < 2; s++)
-        par_serial(&serial[s], PAR_M, s, &jl_kf_joseph);
+    filter.shape = shape;
+    for (*sticky = 0; *sticky < 2; ++*sticky)
+        par_serial(&serial[*sticky], &filter.shape);
     for (s = 0; s < PAIR_SETS; s++) {
         w.set = &pair_sets[s];
-        filter.sticky = s % 2;
+        *sticky = s % 2;
         assert_int_equal(run(PAR_PES + 1, JL_PAR_MSG(PAR_M, PAR_N, PAR_Z),
                              live_in_filter, &filter), 0);
-        assert_same_bits(&filter.trace, &serial[filter.sticky],
+        assert_same_bits(&filter.trace, &serial[*sticky],
                          sizeof filter.trace);
     }
 }
