@@ -50,7 +50,7 @@ typedef struct jl_link_config {
     jl_u32 session;             /* this end's, not 0, new for every start   */
     int max_len;                /* octets of the longest message, >= 0      */
     int slots;                  /* longest messages held each way, >= 1     */
-    jl_u32 rto_us;              /* first retransmission time, say 20000     */
+    jl_u32 rto_us;              /* first retransmission time, say 5000      */
     jl_u32 ack_us;              /* longest wait with an acknowledgement; well
                                    below rto_us, or much is sent twice      */
     jl_u32 beat_us;             /* longest this end says nothing; 0: any    */

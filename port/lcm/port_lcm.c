@@ -15,7 +15,7 @@
 #include <lcm/lcm.h>
 
 #define ACK_PART 4              /* an acknowledgement waits rto_us / 4      */
-#define QUIET_PARTS 12          /* time for repetitions after 1, 3, 7 rto_us */
+#define QUIET_PARTS 48          /* repeats come after 1, 3, 7, 15, 31, 47   */
 #define HANDLE_MAX 64           /* messages between two looks at the clock  */
 #define RUN_MAX 16
 #define NODES_MAX 256
@@ -443,12 +443,25 @@ static int closed(const jl_link *link)
     return link->failed != JL_OK;
 }
 
+/* The other end knows that we have closed, or nobody is there to know it. */
+static int told(const jl_link *link)
+{
+    return link->out_first == link->out_end || (closed(link) && !link->up);
+}
+
 /* Nothing left to wait for: all is delivered, or the other end has closed,
  * knows that we know it, and will receive no more. */
 static int settled(const jl_link *link)
 {
     return jl_link_idle(link)
         || (closed(link) && link->ack_due == 0 && !link->ack_now);
+}
+
+/* Some datagram has not left the carrier. */
+static int holds(const jl_lcm *l)
+{
+    return l->carrier != NULL
+        && l->carrier->timer(l->carrier->context, link_time(clock_us())) >= 0;
 }
 
 static int lossy(const jl_lcm *l)
@@ -474,10 +487,11 @@ void jl_lcm_close(jl_lcm *lcm, long linger_us)
             break;
         flush(lcm);
     }
-    /* A peer whose BYE we have acknowledged, but the acknowledgement was lost,
-     * repeats it: stay to answer, unless nothing was ever lost. */
+    /* A peer that has not heard our BYE waits for it, or has left before us and
+     * will never say: repeat it for a while, unless nothing was ever lost. */
     end = clock_us() + QUIET_PARTS * (long long)lcm->rto_us;
-    while (lossy(lcm) || !every_link(lcm, closed))
+    while (holds(lcm) || (!every_link(lcm, told)
+                          && (lossy(lcm) || !every_link(lcm, closed))))
         if (turn(lcm, end) != JL_OK)
             break;
     flush(lcm);
