@@ -10,7 +10,7 @@ static int refuse(unsigned long *count, int status)
 /* Of those that ask for the same piece, before it is acknowledged or its time
  * is out.  A carrier that mixes up what it carries makes for many, and each
  * brings a whole window onto it. */
-#define ASKS_HEEDED 4
+#define ASKS_HEEDED 8
 
 /* frame->ack is the next piece that the other end waits for. */
 static void take_ack(jl_link *link, const jl_frame *frame, jl_u32 now)

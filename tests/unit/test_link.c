@@ -889,7 +889,7 @@ static void test_link_heeds_few_asks(void **state)
                 sent++;
             forge(JL_FRAME_ACK, 0x1111, 0x2222, 1, (jl_u32)round, 0);
         }
-        assert_in_range(sent, 3, 6);
+        assert_in_range(sent, 3, 10);
         if (round == 1) {               /* its time is out */
             w.now += (jl_u32)jl_link_timer(l, w.now);
             sent = 0;
