@@ -359,6 +359,8 @@ static void odd_pe1(const struct odd *odd, jl_chan *to, jl_chan *from)
     if (odd->at >= 0)
         (odd->in_modes ? modes : ready)[odd->at] = (unsigned char)odd->value;
     (void)jl_chan_send(to, ready, 8 - !odd->in_modes * odd->missing, 0);
+    if (!odd->in_modes)
+        return;                 /* it cannot be told: the host still can */
     (void)jl_chan_recv(from, in, sizeof in, 1000000);   /* READY */
     if (jl_chan_recv(from, in, sizeof in, 1000000) > 0) /* MEAS */
         (void)jl_chan_send(to, modes, MODES_LEN - odd->missing, 0);
