@@ -270,6 +270,43 @@ static void test_death_by_hand_of_a_pe_is_named(void **state)
     }
 }
 
+/* --- jumplink sim -------------------------------------------------------- */
+
+/* The table marks the run that was cut short, and there are no plots. */
+static void test_death_in_sim_is_marked(void **state)
+{
+    static const char *const named[] = {
+        "table.csv", "table.txt", "track.csv", "eight_modes_fresh.csv.partial"
+    };
+    const char *folder = scratch_path("sim");
+    int files = scratch_count(), k;
+    struct program p;
+
+    (void)state;
+    needs_own_net();
+    program_start(&p, "sim", "--data", DATA "carrier_held_1hz.csv", "--model",
+                  model, "--hold", "none", "--timeout", "1", "-o", folder);
+    (void)find_pe(3);
+    program_sleep(0.2);
+    kill(find_pe(2), SIGKILL);
+    program_end(&p, LONGEST);
+    if (p.status != 1 || strstr(p.err, "PE2 was ended by signal 9") == NULL)
+        program_fail(&p, "the death of PE2");
+    if (strstr(p.err, ".partial: partial: the first ") != NULL) {
+        assert_non_null(strstr(p.out, " (partial)\n"));
+        assert_non_null(strstr(p.out, "\nincomplete: "));
+        assert_int_equal(scratch_count(), files + 4);
+        for (k = 0; k < 4; k++) {
+            char path[500];
+
+            snprintf(path, sizeof path, "%s/%s", folder, named[k]);
+            free(program_file(path));
+        }
+    }
+    program_free(&p);
+    check_nobody_left();
+}
+
 int main(void)
 {
     static const struct CMUnitTest tests[] = {
@@ -280,6 +317,7 @@ int main(void)
         cmocka_unit_test(test_death_of_the_host_ends_its_pes),
         cmocka_unit_test(test_death_by_hand_of_the_host_ends_pes),
         cmocka_unit_test(test_death_by_hand_of_a_pe_is_named),
+        cmocka_unit_test(test_death_in_sim_is_marked),
     };
 
     return cmocka_run_group_tests(tests, setup, teardown);
