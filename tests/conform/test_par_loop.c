@@ -330,21 +330,63 @@ static void test_par_refuses_bad_measurements_with_a_code(void **state)
         assert_int_equal(r.answer[i], want[i]);
 }
 
-/* --- ready barrier ------------------------------------------------------- */
+/* --- a PE1 that says what does not belong here --------------------------- */
 
 static const struct par_shape two_pes = {
     2, 3, 1, &jl_kf_joseph, JL_TOPO_FULL, JL_EXCHANGE_GATHER, 0, -1
 };
 
+#define MODES_LEN (8 + 2 + (1 + PAR_N + JL_PACKED(PAR_N)) * JL_REAL_OCTETS)
+
+/* One octet of its READY or its MODES is another, or octets are missing. */
+struct odd {
+    int in_modes, at, value, missing;
+    int status;                 /* what PE0 and the host get                */
+};
+
 struct barrier {
     jl_loop *loop;
-    int status[3];
+    const struct odd *odd;
+    int status, blamed, host_status;
 };
+
+static void odd_pe1(const struct odd *odd, jl_chan *to, jl_chan *from)
+{
+    unsigned char in[JL_PAR_MSG(PAR_M, PAR_N, PAR_Z)];
+    unsigned char ready[8] = { 1, 1, 2, 0, 7, 0, 0, 0 };
+    unsigned char modes[MODES_LEN] = { 3, 1, 1, 0, 1, 0, 0, 0 };
+
+    if (odd->at >= 0)
+        (odd->in_modes ? modes : ready)[odd->at] = (unsigned char)odd->value;
+    (void)jl_chan_send(to, ready, 8 - !odd->in_modes * odd->missing, 0);
+    if (!odd->in_modes)
+        return;                 /* it cannot be told: the host still can */
+    (void)jl_chan_recv(from, in, sizeof in, 1000000);   /* READY */
+    if (jl_chan_recv(from, in, sizeof in, 1000000) > 0) /* MEAS */
+        (void)jl_chan_send(to, modes, MODES_LEN - odd->missing, 0);
+}
+
+static int meet_odd_pe1(jl_chan *to, jl_chan *from)
+{
+    unsigned char buf[JL_PAR_MSG(PAR_M, PAR_N, PAR_Z)];
+    jl_real x[PAR_N], P[PAR_N * PAR_N], mu[PAR_M], z[PAR_Z];
+    jl_estimate estimate = { 0 };
+    jl_meas meas;
+    int status = jl_host_ready(from, 7, buf, sizeof buf, 1000000);
+
+    estimate.x = x;
+    estimate.P = P;
+    estimate.mu = mu;
+    par_meas(&meas, z, 0);
+    if (status == JL_OK)
+        status = jl_host_send(to, &meas, PAR_Z, buf, sizeof buf, 0);
+    return status != JL_OK ? status
+        : jl_host_recv(from, &estimate, 3, PAR_N, buf, sizeof buf, 60000000);
+}
 
 static void barrier_body(int node, void *context)
 {
     struct barrier *b = context;
-    unsigned char buf[64], hello[8] = { 1, 1, 2, 0, 8, 0, 0, 0 };
     jl_chan *to[3] = { NULL }, *from[3] = { NULL };
     int i;
 
@@ -354,24 +396,46 @@ static void barrier_body(int node, void *context)
             from[i] = jl_loop_rx(b->loop, i, node);
         }
     if (node == 0)
-        b->status[0] = par_pe(0, &two_pes, to, from, NULL);
-    else if (node == 1)                 /* has fingerprint 8, the others 7 */
-        b->status[1] = jl_chan_send(to[0], hello, 8, 0);
+        b->status = par_pe(0, &two_pes, to, from, &b->blamed);
+    else if (node == 1)
+        odd_pe1(b->odd, to[0], from[0]);
     else
-        b->status[2] = jl_host_ready(from[0], 7, buf, sizeof buf, 1000000);
+        b->host_status = meet_odd_pe1(to[0], from[0]);
 }
 
-static void test_par_refuses_to_start_with_different_models(void **state)
+static void test_par_believes_no_odd_pe(void **state)
 {
-    struct barrier b = { 0 };
+    static const struct odd odds[] = {
+        { 0, 0, 9, 0, JL_EMSG },        /* type */
+        { 0, 1, 0, 0, JL_EMSG },        /* about PE0 */
+        { 0, 1, 2, 0, JL_EMSG },        /* about a PE that is not there */
+        { 0, 2, 3, 0, JL_EMODEL },      /* of three PEs */
+        { 0, 4, 8, 0, JL_EMODEL },      /* fingerprint */
+        { 0, -1, 0, 1, JL_EMSG },
+        { 1, 0, 9, 0, JL_EMSG },        /* type */
+        { 1, 1, 0, 0, JL_EMSG },        /* from PE0 */
+        { 1, 2, 2, 0, JL_EMSG },        /* two modes */
+        { 1, 4, 2, 0, JL_EMSG },        /* of another measurement */
+        { 1, 7, 1, 0, JL_EMSG },
+        { 1, -1, 0, 1, JL_ELENGTH }
+    };
+    static const struct odd good = { 1, -1, 0, 0, JL_OK };
+    size_t k;
 
     (void)state;
-    b.loop = jl_loop_new(3, JL_PAR_MSG(PAR_M, PAR_N, PAR_Z), 2);
-    assert_int_equal(jl_loop_run(b.loop, barrier_body, &b), JL_OK);
-    jl_loop_free(b.loop);
-    assert_int_equal(b.status[0], JL_EMODEL);
-    assert_int_equal(b.status[1], JL_OK);
-    assert_int_equal(b.status[2], JL_EMODEL);
+    for (k = 0; k <= sizeof odds / sizeof *odds; k++) {
+        struct barrier b = { 0 };
+
+        b.odd = k == 0 ? &good : &odds[k - 1];
+        b.loop = jl_loop_new(3, JL_PAR_MSG(PAR_M, PAR_N, PAR_Z), 2);
+        assert_int_equal(jl_loop_run(b.loop, barrier_body, &b), JL_OK);
+        jl_loop_free(b.loop);
+        assert_int_equal(b.host_status, b.odd->status);
+        if (k == 0)
+            continue;
+        assert_int_equal(b.status, b.odd->status);
+        assert_int_equal(b.blamed, 1);
+    }
 }
 
 /* --- init ---------------------------------------------------------------- */
@@ -427,7 +491,7 @@ int main(void)
         cmocka_unit_test(test_par_reduce_refuses_a_chain_that_is_not_sticky),
         cmocka_unit_test(test_par_blames_the_dead_and_not_the_relay),
         cmocka_unit_test(test_par_refuses_bad_measurements_with_a_code),
-        cmocka_unit_test(test_par_refuses_to_start_with_different_models),
+        cmocka_unit_test(test_par_believes_no_odd_pe),
         cmocka_unit_test(test_par_init_refuses_what_does_not_fit),
     };
 
