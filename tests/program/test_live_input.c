@@ -334,6 +334,42 @@ static int lose_the_network(void)
     return unshare(CLONE_NEWNET);
 }
 
+/* The way to end a run, from a terminal that signals the PEs as well: all that
+ * came is answered, compared and kept. */
+static void end_by(int signal)
+{
+    struct answers answers = { 0, { 0 } };
+    jumplink_estimate_subscription_t *sub = jumplink_estimate_subscribe(
+        live_lcm, "JL.ended.estimate", on_estimate, &answers);
+    double deadline = program_now() + PROGRAM_LIMIT;
+    struct program *p = live_start("setsid", JUMPLINK, "sim", "--input", "lcm",
+                                   "--model", two, "--lcm-url", LIVE_URL,
+                                   "--run", "ended", "--pes", "2",
+                                   "--timeout", "20", "--idle", "60", "-o",
+                                   folder);
+    int k;
+
+    live_await_words(p, "listening to ");
+    for (k = 1; k <= 3; k++)
+        send("ended", k, k, 0);
+    while (answers.count < 3 && program_now() < deadline)
+        (void)lcm_handle_timeout(live_lcm, 100);
+    assert_int_equal(kill(-p->pid, signal), 0);
+    live_end(p);
+    check_counts(p, 3, 0, 0, 0);
+    program_free(p);
+    check_refiltered();
+    jumplink_estimate_unsubscribe(live_lcm, sub);
+}
+
+static void test_live_ended_from_a_terminal(void **state)
+{
+    (void)state;
+    needs_own_net();
+    end_by(SIGINT);
+    end_by(SIGHUP);
+}
+
 static void test_live_without_a_network(void **state)
 {
     static const char *const told[] = {
@@ -528,6 +564,7 @@ int main(void)
         live_test(test_live_nothing_comes),
         live_test(test_live_nothing_of_use_comes),
         live_test(test_live_killed_pe_while_waiting),
+        live_test(test_live_ended_from_a_terminal),
         live_test(test_live_without_a_network),
         live_test(test_live_wrong_use),
         live_test(test_live_copies_of_many_states),

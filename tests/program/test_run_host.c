@@ -21,6 +21,7 @@ static struct said said[4];
 static int says, next;
 static double now_us;
 static int raises;              /* SIGINT comes while the host waits */
+static int (*alive)(void *context);
 
 static struct model model;
 static struct data_file data;
@@ -97,6 +98,7 @@ static int start(void **state)
     options.pes = PES;
     says = next = raises = 0;
     now_us = 0;
+    alive = NULL;
     return estimates_open(&e, &data, &model);
 }
 
@@ -111,7 +113,7 @@ static int run_against_pe0(int *failed_pe)
 {
     static const jl_chan_ops ops = { pe0_send, pe0_recv, NULL };
     jl_chan to, from;
-    struct run_host host = { &to, &from, NULL, NULL, -1 };
+    struct run_host host = { &to, &from, alive, NULL, -1 };
     int status;
 
     jl_chan_init(&to, &ops, run_max_len(&model), 2);
@@ -172,6 +174,27 @@ static void test_host_does_not_wait_for_ever(void **state)
     assert_int_equal(pe, -1);
 }
 
+static int nobody_alive(void *context)
+{
+    (void)context;
+    return 0;
+}
+
+/* Long before any deadline, at the start and in a step. */
+static void test_host_notices_that_a_pe_is_dead(void **state)
+{
+    int pe;
+
+    (void)state;
+    alive = nobody_alive;
+    assert_int_equal(run_against_pe0(&pe), JL_ECLOSED);
+    assert_int_equal(row, -1);
+    say_ready(now_us);
+    assert_int_equal(run_against_pe0(&pe), JL_ECLOSED);
+    assert_int_equal(row, 0);
+    assert_true(now_us < 1e6);
+}
+
 static int stop(void)
 {
     return interrupted() != NULL;
@@ -219,6 +242,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_host_waits_as_long_as_pe0, start,
                                         end),
         cmocka_unit_test_setup_teardown(test_host_does_not_wait_for_ever,
+                                        start, end),
+        cmocka_unit_test_setup_teardown(test_host_notices_that_a_pe_is_dead,
                                         start, end),
         cmocka_unit_test_setup_teardown(test_host_interrupted, start, end),
     };
