@@ -28,7 +28,8 @@ int run_failed(const struct data_file *data, long row, int status,
         snprintf(where, sizeof where, "the run ends at %s:%ld", data->path,
                  data->line[row]);
     if (failed_pe >= 0)
-        snprintf(who, sizeof who, "no word from PE%d: ", failed_pe);
+        snprintf(who, sizeof who, "%s PE%d: ", status == JL_EMODEL
+                 ? "not like" : "no word from", failed_pe);
     else if (row < 0 && run_is_channels(status) && status != JL_EMODEL)
         strcpy(who, "no word from PE0: ");
     if (status == RUN_INTERRUPTED)
@@ -68,8 +69,8 @@ static int receive(struct run_host *host, jl_estimate *estimate,
         slice = left < SLICE_US ? left : SLICE_US;
         left -= slice;
         status = estimate == NULL
-            ? jl_host_ready(host->from, run_fingerprint(model, options), buf,
-                            cap, slice)
+            ? jl_host_ready(host->from, run_fingerprint(model, options),
+                            &host->failed_pe, buf, cap, slice)
             : jl_host_recv(host->from, estimate, model->M, model->n, buf, cap,
                            slice);
         if (estimate != NULL)

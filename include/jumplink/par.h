@@ -79,9 +79,11 @@ typedef struct jl_estimate {
 
 /* Wait for the PEs: PE0 says that all are there and agree on `fingerprint`.
  * buf [cap] octets, 16 are enough.
- * Returns JL_OK, JL_EMODEL, or the channel's error. */
-int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, unsigned char *buf,
-                  int cap, long timeout_us);
+ * Returns JL_OK, JL_EMODEL, or the channel's error; or, when PE0 cannot go on
+ * because of another PE, the error of that channel.  *failed_pe is that PE, or
+ * the one whose fingerprint differs; -1: none. */
+int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, int *failed_pe,
+                  unsigned char *buf, int cap, long timeout_us);
 
 /* Send a measurement with m components; receive the answer to each before the
  * next, or at most 2 slots + 1 may be on their way (slots of the channels).

@@ -14,7 +14,6 @@
 
 #include <lcm/lcm.h>
 
-#define ACK_PART 4              /* an acknowledgement waits rto_us / 4      */
 #define QUIET_PARTS 48          /* repeats come after 1, 3, 7, 15, 31, 47   */
 #define HANDLE_MAX 64           /* messages between two looks at the clock  */
 #define RUN_MAX 16
@@ -317,7 +316,7 @@ static int peer_init(jl_lcm *l, int node, const jl_lcm_config *c,
     link.max_len = c->max_len;
     link.slots = slots;
     link.rto_us = l->rto_us;
-    link.ack_us = l->rto_us / ACK_PART;
+    link.ack_us = l->rto_us / 8 * 5;
     link.beat_us = c->beat_us;
     link.silence_us = c->silence_us;
     p->mem = malloc((size_t)octets);

@@ -1,19 +1,22 @@
 /* The host's side of a run. */
 #include "par/par_msg.h"
 
-int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, unsigned char *buf,
-                  int cap, long timeout_us)
+int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, int *failed_pe,
+                  unsigned char *buf, int cap, long timeout_us)
 {
-    int len = jl_chan_recv(from_pe0, buf, cap, timeout_us);
-    int unused, status;
+    int len = jl_chan_recv(from_pe0, buf, cap, timeout_us), status;
 
+    *failed_pe = -1;
     if (len < 0)
         return len;
-    if (jli_msg_fault_read(&unused, &status, JL_MAX_PES, buf, len) == JL_OK)
+    if (jli_msg_fault_read(failed_pe, &status, JL_MAX_PES, buf, len) == JL_OK)
         return status;
     if (len != JLI_MSG_HEADER || buf[0] != JLI_READY)
         return JL_EMSG;
-    return jl_get_u32(buf + 4) == fingerprint ? JL_OK : JL_EMODEL;
+    if (jl_get_u32(buf + 4) == fingerprint)
+        return JL_OK;
+    *failed_pe = buf[1];
+    return JL_EMODEL;
 }
 
 int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,

@@ -209,7 +209,7 @@ static void host(jl_chan *to, jl_chan *from, struct job *job)
     estimate.x = bank->x;
     estimate.P = bank->P;
     estimate.mu = bank->mu;
-    bench_must(jl_host_ready(from, 0, bank->buf, bank->cap, BENCH_WAIT_US)
+    bench_must(jl_host_ready(from, 0, &k, bank->buf, bank->cap, BENCH_WAIT_US)
                == JL_OK, "the PEs are not ready");
     for (k = 0; k < WARM + job->steps; k++) {
         set_meas(&meas, z, k);

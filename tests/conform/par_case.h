@@ -223,7 +223,8 @@ static inline int par_host(struct par_trace *trace,
     estimate.x = x;
     estimate.P = P;
     estimate.mu = mu;
-    status = jl_host_ready(from, 7, buf, sizeof buf, 5000000);
+    status = jl_host_ready(from, 7, &estimate.failed_pe, buf, sizeof buf,
+                           60000000);
     for (k = 0; k < PAR_STEPS && status == JL_OK; k++) {
         par_meas(&meas, z, k);
         status = jl_host_send(to, &meas, PAR_Z, buf, sizeof buf, 5000000);

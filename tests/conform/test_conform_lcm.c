@@ -254,7 +254,7 @@ static void misses_the_other(int pe)
     EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, LONG_US), ==, 0);
     EXPECT(jl_chan_recv(rx(1, 0), NULL, 0, JL_FOREVER), ==, JL_ESILENT);
     EXPECT(jl_chan_send(tx(0, 1), NULL, 0, LONG_US), ==, JL_ESILENT);
-    EXPECT(jl_lcm_silence(lcm, 1), ==, -1);
+    EXPECT(jl_lcm_silence(lcm, 1), >, 0);
 }
 
 static void waits_and_hangs(int pe)

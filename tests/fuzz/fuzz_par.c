@@ -364,7 +364,8 @@ static void be_host(struct game *g, jl_chan *to, jl_chan *from)
     estimate.P = P;
     estimate.mu = mu;
     bank_init(&g->bank[g->npe], 0);
-    status = jl_host_ready(from, 7, buf, sizeof buf, WAIT_US);
+    status = jl_host_ready(from, 7, &estimate.failed_pe, buf, sizeof buf,
+                           WAIT_US);
     g->begun = 1;
     for (row = 0; row < ROWS && g->script.left > 0 && status == JL_OK;
          row++) {

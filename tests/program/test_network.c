@@ -253,14 +253,15 @@ static void test_network_pe_with_another_type_of_number(void **state)
                        "pe", "--pe", "1", "--model", two, BY_HAND, "--start",
                        "3", NULL });
     end_three(p);
-    check_hint(&p[0], "the run does not start");
+    check_hint(&p[0], "the run does not start: no word from PE1: ");
     check_hint(&p[1], "PE0: no word from PE1");
     check_hint(&p[2], "PE1: no word from PE0");
     free_three(p);
 }
 
-/* A PE is not there: host and the other PE, which names it, end. */
-static void check_missing(const char *there, const char *words)
+/* A PE is not there: host and the other PE, which both name it, end. */
+static void check_missing(const char *there, const char *words,
+                          const char *host_words)
 {
     struct program host, pe;
 
@@ -268,7 +269,7 @@ static void check_missing(const char *there, const char *words)
     program_start(&pe, "pe", "--pe", there, "--model", two, BY_HAND, IN_VAIN);
     program_end(&host, PROGRAM_LIMIT);
     program_end(&pe, PROGRAM_LIMIT);
-    check_refused(&host, 1, "does not start");
+    check_refused(&host, 1, host_words);
     check_refused(&pe, 1, words);
     assert_true(host.seconds < LEAVING);
     assert_true(pe.seconds < LEAVING);
@@ -281,8 +282,10 @@ static void test_network_missing_pe(void **state)
 {
     (void)state;
     needs_own_net();
-    check_missing("0", "PE0: no word from PE1");
-    check_missing("1", "PE1: no word from PE0");
+    check_missing("0", "PE0: no word from PE1",
+                  "does not start: no word from PE1: ");
+    check_missing("1", "PE1: no word from PE0",
+                  "does not start: no word from PE0: ");
 }
 
 static void test_network_host_alone(void **state)
