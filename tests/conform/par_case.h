@@ -229,8 +229,8 @@ static inline int par_host(struct par_trace *trace,
         par_meas(&meas, z, k);
         status = jl_host_send(to, &meas, PAR_Z, buf, sizeof buf, 5000000);
         if (status == JL_OK)
-            status = jl_host_recv(from, &estimate, shape->M, PAR_N, buf, sizeof buf,
-                                  60000000);
+            status = jl_host_recv(from, &estimate, shape->M, PAR_N, buf,
+                                  sizeof buf, 60000000);
         if (status == JL_OK && estimate.seq != meas.seq)
             status = JL_EMSG;
         if (status == JL_OK)
