@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "complain.h"
 #include "out_file.h"
@@ -189,29 +190,54 @@ void estimates_write(const struct estimates *e, const struct data_file *data,
         fprintf(out, "# partial: %ld of %ld rows\n", rows, e->rows);
 }
 
+/* PATH.partial, or, where that makes no sense, the path itself; NULL: no memory.
+ * To be freed. */
+static char *partial_name(const char *path)
+{
+    struct stat is;
+    int beside = strcmp(path, "-") != 0 && (stat(path, &is) != 0
+                                            || S_ISREG(is.st_mode));
+    char *name;
+
+    return asprintf(&name, "%s%s", path, beside ? ".partial" : "") < 0
+        ? NULL : name;
+}
+
+int estimates_save(const struct estimates *e, const struct data_file *data,
+                   const char *path)
+{
+    char *partial = partial_name(path != NULL ? path : "-");
+    struct out_file out;
+    int status = out_open(&out, path);
+
+    if (status == 0) {
+        estimates_write(e, data, 0, out.stream);
+        status = out_close(&out, 1);
+    }
+    if (status == 0 && path != NULL && partial != NULL
+        && strcmp(partial, path) != 0)
+        unlink(partial);
+    free(partial);
+    return status;
+}
+
 int estimates_save_partial(const struct estimates *e,
                            const struct data_file *data, const char *path)
 {
-    const char *to = path != NULL ? path : "-";
+    char *name = partial_name(path != NULL ? path : "-");
     struct out_file out;
-    struct stat is;
-    char *name;
-    int status, beside;
+    int status;
 
-    if (e->done == 0)
-        return 0;
-    beside = strcmp(to, "-") != 0 && (stat(to, &is) != 0
-                                      || S_ISREG(is.st_mode));
-    if (asprintf(&name, "%s%s", to, beside ? ".partial" : "") < 0)
-        return complain(to, 0, NULL, "no memory");
-    status = out_open(&out, name);
+    if (name == NULL)
+        return complain(path, 0, NULL, "no memory");
+    status = e->done > 0 ? out_open(&out, name) : -1;
     if (status == 0) {
         estimates_write(e, data, 1, out.stream);
         status = out_close(&out, 1);
     }
     if (status == 0)
-        complain(beside ? name : "output", 0, NULL,
+        complain(strcmp(name, "-") != 0 ? name : "output", 0, NULL,
                  "partial: the first %ld of %ld rows", e->done, e->rows);
     free(name);
-    return status;
+    return e->done > 0 ? status : 0;
 }

@@ -48,6 +48,11 @@ long estimates_times(const struct estimates *e, double *median_us,
 void estimates_write(const struct estimates *e, const struct data_file *data,
                      int partial, FILE *out);
 
+/* All of them to path (NULL: standard output); a PATH.partial of an earlier run
+ * goes.  Returns 0, or -1 after a message. */
+int estimates_save(const struct estimates *e, const struct data_file *data,
+                   const char *path);
+
 /* What a run that failed has done so far, to PATH.partial (or standard output,
  * if path is NULL), and a word on standard error; nothing if it has done
  * nothing.  What is at path stays as it is.  Returns 0, or -1 after a

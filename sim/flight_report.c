@@ -111,16 +111,11 @@ static int open_in(struct out_file *out, const char *folder, const char *name,
 static int write_estimates(const struct flight_report *r,
                            const struct flight_run *run, const char *folder)
 {
-    struct out_file out;
     char path[4096];
 
     snprintf(path, sizeof path, "%s/%s.csv", folder, run->name);
-    if (run->partial)
-        return estimates_save_partial(&run->e, r->data, path);
-    if (out_open(&out, path) != 0)
-        return -1;
-    estimates_write(&run->e, r->data, 0, out.stream);
-    return out_close(&out, 1);
+    return run->partial ? estimates_save_partial(&run->e, r->data, path)
+        : estimates_save(&run->e, r->data, path);
 }
 
 /* Time, what was measured, whether the row repeats the one before, and the

@@ -6,17 +6,6 @@
 #include "progress.h"
 #include "run.h"
 
-static int write_estimates(const struct estimates *e,
-                           const struct data_file *data, const char *path)
-{
-    struct out_file out;
-
-    if (out_open(&out, path) != 0)
-        return 1;
-    estimates_write(e, data, 0, out.stream);
-    return out_close(&out, 1) == 0 ? 0 : 1;
-}
-
 /* Better known before a long run.  What is not a file is not opened twice. */
 static int can_write(const char *path)
 {
@@ -43,7 +32,7 @@ static int run_data(const struct model *model, const struct data_file *data,
     status = run(&e, &traffic, model, data, options);
     progress_begin(NULL);
     if (status == 0)
-        status = write_estimates(&e, data, options->out);
+        status = estimates_save(&e, data, options->out) == 0 ? 0 : 1;
     else
         (void)estimates_save_partial(&e, data, options->out);
     estimates_close(&e);

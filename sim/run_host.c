@@ -22,7 +22,7 @@ int run_is_channels(int status)
 int run_failed(const struct data_file *data, long row, int status,
                int failed_pe)
 {
-    char where[400] = "the run does not start", who[32] = "";
+    char where[400] = "the run does not start", who[40] = "";
 
     if (row >= 0)
         snprintf(where, sizeof where, "the run ends at %s:%ld", data->path,
@@ -33,7 +33,7 @@ int run_failed(const struct data_file *data, long row, int status,
     else if (row < 0 && run_is_channels(status) && status != JL_EMODEL)
         strcpy(who, "no word from PE0: ");
     if (status == RUN_INTERRUPTED)
-        complain("interrupted", 0, NULL, "%s by %s", where, interrupted());
+        complain(interrupted(), 0, NULL, "%s", where);
     else if (row < 0 || run_is_channels(status))
         complain("PEs", 0, NULL, "%s: %s%s", where, who,
                  jl_status_text(status));
@@ -62,7 +62,7 @@ static int receive(struct run_host *host, jl_estimate *estimate,
 {
     long left = estimate == NULL
         ? latest_us(options->start_us, 3 * options->pes)
-        : latest_us(options->timeout_us, 2 * options->pes), slice;
+        : latest_us(run_message_us(options), 2 * options->pes), slice;
     int status;
 
     do {

@@ -87,8 +87,9 @@ static void become_pe(int pe, const char *url, const char *run,
     argv[n] = NULL;
     close_range(3, ~0u, 0);             /* LCM's sockets are not for it */
     prctl(PR_SET_PDEATHSIG, SIGKILL);
-    signal(SIGINT, SIG_IGN);            /* of the terminal: the host ends */
-    signal(SIGHUP, SIG_IGN);            /* the run, and so does a PE      */
+    signal(SIGINT, SIG_IGN);            /* to all of them: the host ends    */
+    signal(SIGHUP, SIG_IGN);            /* the run in order; without a host */
+    signal(SIGTERM, SIG_IGN);           /* they die at once                 */
     if (getppid() == parent)
         execv("/proc/self/exe", (char *const *)argv);
     _exit(126);

@@ -14,6 +14,11 @@ int run_max_len(const struct model *model)
     return JL_PAR_MSG(model->M, model->n, model->m);
 }
 
+long run_message_us(const struct options *options)
+{
+    return options->timeout_us + options->timeout_us / 4;
+}
+
 /* A ring's exchange sends up to pes/2 messages to a neighbour. */
 int run_slots(const struct options *options)
 {
@@ -86,7 +91,7 @@ int run_pe(int pe, const struct model *model, const struct options *options,
         config.context = &bank;
         config.fingerprint = run_fingerprint(model, options);
         config.start_us = options->start_us;
-        config.timeout_us = options->timeout_us;
+        config.timeout_us = run_message_us(options);
         status = jl_par_init(&par, &bank.imm, &config, buf, cap, mode_status,
                              z);
         if (status == JL_OK)

@@ -47,20 +47,23 @@ static void write_record(const struct data_file *data, FILE *out)
     }
 }
 
-static int write_files(const struct estimates *e, const struct live_input *live,
+static int save_record(const struct live_input *live,
                        const struct model *model,
                        const struct options *options)
 {
     struct out_file out;
 
-    if (out_open(&out, path_of(options, model, "live")) != 0)
-        return 1;
-    estimates_write(e, &live->data, 0, out.stream);
-    if (out_close(&out, 1) != 0
-        || out_open(&out, path_of(options, model, "record")) != 0)
+    if (out_open(&out, path_of(options, model, "record")) != 0)
         return 1;
     write_record(&live->data, out.stream);
     return out_close(&out, 1) != 0;
+}
+
+static int save_all(const struct estimates *e, const struct live_input *live,
+                    const struct model *model, const struct options *options)
+{
+    return estimates_save(e, &live->data, path_of(options, model, "live")) != 0
+        || save_record(live, model, options) != 0;
 }
 
 /* --- words --------------------------------------------------------------- */
@@ -115,7 +118,7 @@ static int compare(const struct estimates *e, const struct live_input *live,
     if (run_serial(&serial, model, &live->data, options) == 0) {
         same = estimates_same(&serial, e);
         print_report(e, &serial, live, same);
-        status = write_files(e, live, model, options);
+        status = save_all(e, live, model, options);
         if (!same && options->exchange == JL_EXCHANGE_GATHER)
             status = 1;
     }
@@ -141,9 +144,11 @@ static int run_live(struct live_input *live, const struct model *model,
     if (status == 0)
         status = live->data.rows == 0 ? nothing_came(live, options)
             : compare(&e, live, model, options);
-    else
+    else if (e.done > 0) {
         (void)estimates_save_partial(&e, &live->data,
                                      path_of(options, model, "live"));
+        (void)save_record(live, model, options);
+    }
     estimates_close(&e);
     return status;
 }

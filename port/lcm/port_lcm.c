@@ -195,7 +195,10 @@ static int turn(jl_lcm *l, long long deadline)
 
 static long long deadline_of(long timeout_us)
 {
-    return timeout_us == JL_FOREVER ? NEVER : clock_us() + timeout_us;
+    long long now = clock_us();
+
+    return timeout_us == JL_FOREVER || timeout_us > NEVER - now
+        ? NEVER : now + timeout_us;
 }
 
 static int lcm_chan_send(jl_chan *chan, const unsigned char *msg, int len,

@@ -189,7 +189,7 @@ static void test_death_of_a_serial_run_keeps_what_is_done(void **state)
     program_start(&p, "filter", model, data, "--port", "loop", "-o", out);
     program_sleep(0.2);
     kill(p.pid, SIGINT);
-    check_death(&p, "interrupted: the run ends at ", -1);
+    check_death(&p, "SIGINT: the run ends at ", -1);
 }
 
 static void test_death_of_the_host_ends_its_pes(void **state)

@@ -729,6 +729,11 @@ static void test_filter_step_that_fails(void **state)
     check_step_fails("huge.csv:4: ", model, data, "--port", "lcm",
                      PATIENTLY);
     check_nobody_left();
+    /* a run that succeeds leaves nothing of one that failed */
+    free(program_file(scratch_path("kept.csv.partial")));
+    run_jumplink("filter", CVCA3, "-o", scratch_path("kept.csv"));
+    check_good(&ran);
+    assert_null(scratch_read(scratch_path("kept.csv.partial")));
     free(data);
 }
 
