@@ -3,6 +3,7 @@
 #include "scratch.h"
 
 #include <fcntl.h>
+#include <errno.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/resource.h>
@@ -297,15 +298,18 @@ static void test_plot_that_fails(void **state)
 /* What a terminal shows of work, a complaint in its midst, and its end. */
 static void test_progress_on_a_terminal(void **state)
 {
-    int master = posix_openpt(O_RDWR | O_NOCTTY), saved = dup(STDERR_FILENO);
+    int master = posix_openpt(O_RDWR | O_NOCTTY), terminal = -1, saved;
     char said[400] = "";
-    int terminal;
     ssize_t n;
 
     (void)state;
-    assert_true(master >= 0 && grantpt(master) == 0 && unlockpt(master) == 0);
-    terminal = open(ptsname(master), O_RDWR | O_NOCTTY);
-    assert_true(terminal >= 0);
+    if (master >= 0 && grantpt(master) == 0 && unlockpt(master) == 0)
+        terminal = open(ptsname(master), O_RDWR | O_NOCTTY);
+    if (terminal < 0) {
+        print_message("skipped: no pseudo-terminal: %s\n", strerror(errno));
+        skip();
+    }
+    saved = dup(STDERR_FILENO);
     fflush(stderr);
     dup2(terminal, STDERR_FILENO);
     progress_begin("a flight");
