@@ -2,8 +2,8 @@
 #include "close.h"
 #include "scratch.h"
 
-#include <fcntl.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/resource.h>
