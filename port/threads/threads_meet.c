@@ -38,12 +38,18 @@ static int settled(struct end *end)
     return state != TAKING && state != GIVING;
 }
 
-/* The receiver has what was offered or given before, or has gone. */
-static int answered(struct end *tx)
+/* The receiver has what was offered or given before, and may want more. */
+static int was_had(struct end *tx)
 {
     int state = state_of(tx);
 
-    return state == FREE || state == WANTED || jli_closed(&tx->ring->rx);
+    return state == FREE || state == WANTED;
+}
+
+/* ... or has gone. */
+static int answered(struct end *tx)
+{
+    return was_had(tx) || jli_closed(&tx->ring->rx);
 }
 
 /* The sender has come, or has gone. */
@@ -62,13 +68,14 @@ static void copy(unsigned char *to, const unsigned char *from, int len)
 
 /* --- send ---------------------------------------------------------------- */
 
-/* Returns 1 if the message was taken before we could take it back. */
+/* Returns 1 if the message was taken before we could take it back.  Not while
+ * it is TAKING: that may end as OFFERED. */
 static int was_taken(struct end *tx)
 {
     jl_chan *chan = &tx->chan;
 
     while (!move(tx->ring, OFFERED, FREE)) {
-        if (settled(tx))
+        if (was_had(tx))
             return 1;
         (void)jli_await(&chan, 1, settled, NEVER);
     }

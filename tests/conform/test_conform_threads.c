@@ -193,6 +193,32 @@ static void test_threads_too_long_for_one_who_waits(void **state)
         assert_int_equal(run(2, too_long_for_one_who_waits), 0);
 }
 
+/* A sender gives up, again and again, just while a receiver with too short a
+ * buffer looks at the message: it has not been taken. */
+static void too_long_for_one_who_gives_up(int pe)
+{
+    unsigned char msg[3] = { 1, 2, 3 };
+    int status = JL_ETIMEOUT, tries;
+
+    if (pe == 0) {
+        for (tries = 0; status == JL_ETIMEOUT; tries++)
+            status = jl_chan_send(tx(0, 1), msg, 3, tries % 4);
+        EXPECT(status, ==, JL_ECLOSED);
+    } else {
+        for (tries = 0; tries < 300000; tries++) {
+            status = jl_chan_recv(rx(0, 1), msg, 2, 0);
+            EXPECT(status == JL_ETOOLONG || status == JL_ETIMEOUT, ==, 1);
+        }
+    }
+}
+
+static void test_threads_too_long_for_one_who_gives_up(void **state)
+{
+    (void)state;
+    threads_port.slots = 0;
+    assert_int_equal(run(2, too_long_for_one_who_gives_up), 0);
+}
+
 /* --- closing ------------------------------------------------------------- */
 
 /* Send while there is room; what the first that is not taken returns. */
@@ -376,6 +402,7 @@ int main(void)
         cmocka_unit_test(test_threads_more_than_cores),
         cmocka_unit_test(test_threads_haste),
         cmocka_unit_test(test_threads_too_long_for_one_who_waits),
+        cmocka_unit_test(test_threads_too_long_for_one_who_gives_up),
         cmocka_unit_test(test_threads_closed_while_blocked),
         cmocka_unit_test(test_threads_idle_costs_nothing),
         cmocka_unit_test(test_threads_run_again),
