@@ -1,5 +1,6 @@
 /* jumplink: the subcommands by their names. */
 #include <fcntl.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -51,6 +52,7 @@ int main(int argc, char **argv)
     size_t i;
 
     fill_standard();
+    signal(SIGCHLD, SIG_DFL);           /* or who ends is not waited for */
     if (argc < 2) {
         help(stderr);
         return 2;

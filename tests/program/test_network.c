@@ -343,6 +343,11 @@ static int no_multicast(void)
     return own_limits(CLONE_NEWNET) != 0 || forbid_namespaces();
 }
 
+static int ignore_children(void)
+{
+    return signal(SIGCHLD, SIG_IGN) == SIG_ERR;
+}
+
 static void run_where(int (*where)(void))
 {
     const char *const told[] = { "filter", two, data, FLIGHT, "--port", "lcm",
@@ -353,6 +358,17 @@ static void run_where(int (*where)(void))
     program_end(&ran, PROGRAM_LIMIT);
     if (ran.status == 77)
         print_message("the limits of namespaces cannot be set here\n");
+}
+
+/* As some daemons start programs. */
+static void test_network_from_one_who_ignores_children(void **state)
+{
+    (void)state;
+    needs_own_net();
+    run_where(ignore_children);
+    check_good(&ran);
+    check_same_text(ran.out, serial);
+    check_nobody_left();
 }
 
 static void test_network_falls_back_to_the_machines_own(void **state)
@@ -442,6 +458,7 @@ int main(void)
         cmocka_unit_test(test_network_pe_with_another_type_of_number),
         cmocka_unit_test(test_network_missing_pe),
         cmocka_unit_test(test_network_host_alone),
+        cmocka_unit_test(test_network_from_one_who_ignores_children),
         cmocka_unit_test(test_network_falls_back_to_the_machines_own),
         cmocka_unit_test(test_network_without_multicast),
         cmocka_unit_test(test_network_wrong_use),
