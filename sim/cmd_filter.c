@@ -2,6 +2,7 @@
 #include <stdio.h>
 
 #include "command.h"
+#include "jumplink/par.h"
 #include "options.h"
 #include "run_file.h"
 
@@ -40,6 +41,11 @@ int cmd_filter(int argc, char **argv)
         return misuse("filter", "--lcm-url needs --port lcm");
     if (options.run != NULL && options.lcm_url == NULL)
         return misuse("filter", "--run names what is published on --lcm-url");
+    if (options.port == PORT_NONE && (options.topology != JL_TOPO_FULL
+                                      || options.exchange
+                                             != JL_EXCHANGE_GATHER))
+        return misuse("filter", "--topology and --exchange need --pes or "
+                      "--port");
     if (options.pes == 0)
         options.pes = 4;
     return run_file(argv[optind], argv[optind + 1], &options);

@@ -805,6 +805,10 @@ static void test_filter_options_that_do_not_go_together(void **state)
     refused("--lcm-url|--port lcm", "filter", CVCA3, "--lcm-url", "udpm://x",
             "--port", "loop");
     refused("--run", "filter", CVCA3, "--run", "x");
+    refused("--topology|--pes or --port", "filter", CVCA3, "--topology",
+            "ring");
+    refused("--exchange|--pes or --port", "filter", CVCA3, "--exchange",
+            "reduce");
     refused("--mode|kf", "filter", CVCA3, "--mode", "1");
     refused("--mode|has 2", "filter", CVCA3, "--filter", "kf");
     refused("--mode 2|0 to 1", "filter", CVCA3, "--filter", "kf", "--mode",
