@@ -98,6 +98,9 @@ static int nothing_came(const struct live_input *live,
         complain(live->data.path, 0, NULL, "no measurement that %s can use: "
                  "%lu refused, the first: %s", live->model->path,
                  live->count.refused, live->refusal);
+    else if (interrupted() != NULL)
+        complain(interrupted(), 0, NULL, "no measurement on %s so far",
+                 options->lcm_url);
     else
         complain(live->data.path, 0, NULL, "no measurement on %s within "
                  "%.6g s", options->lcm_url, (double)options->start_us * 1e-6);

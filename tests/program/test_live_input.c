@@ -370,6 +370,21 @@ static void test_live_ended_from_a_terminal(void **state)
     end_by(SIGHUP);
 }
 
+static void test_live_interrupted_before_anything_came(void **state)
+{
+    struct program *p;
+
+    (void)state;
+    needs_own_net();
+    p = live_filter(two, "silent", folder, "loop");
+    assert_int_equal(kill(p->pid, SIGTERM), 0);
+    live_end(p);
+    if (p->status != 1 || strstr(p->err, "SIGTERM: no measurement on "
+                                 LIVE_URL " so far\n") == NULL)
+        program_fail(p, "the signal to be named");
+    program_free(p);
+}
+
 static void test_live_without_a_network(void **state)
 {
     static const char *const told[] = {
@@ -565,6 +580,7 @@ int main(void)
         live_test(test_live_nothing_of_use_comes),
         live_test(test_live_killed_pe_while_waiting),
         live_test(test_live_ended_from_a_terminal),
+        live_test(test_live_interrupted_before_anything_came),
         live_test(test_live_without_a_network),
         live_test(test_live_wrong_use),
         live_test(test_live_copies_of_many_states),
