@@ -208,8 +208,9 @@ static void test_live_fills_a_long_gap(void **state)
     p = live_filter(two, "gap", folder, "loop");
     send("gap", 0, 0, 0);
     send("gap", 10001, 100.01, 0);
+    send_none("gap", 10002, 1e300);     /* and a time that is no step away */
     live_end(p);
-    check_counts(p, 2, 10000, 0, 0);
+    check_counts(p, 2, 10000, 0, 1);
     assert_non_null(strstr(p->out, "predicted through 10000\n"));
     program_free(p);
     check_refiltered();
