@@ -5,7 +5,11 @@
  * did not arrive, at times evenly between its neighbours: the filter predicts
  * through them.  Between two records nothing is filled.  A number that is not
  * above the last one is late or doubled, and ignored.  A message that cannot
- * be a measurement of this model is refused, and leaves a gap. */
+ * be a measurement of this model is refused, and leaves a gap.
+ *
+ * One source a channel: a second one's numbers would pass for gaps or late
+ * ones.  Its times are trusted: one so far ahead that the model cannot step
+ * there ends the run as a failed step does. */
 #ifndef SIM_LIVE_INPUT_H
 #define SIM_LIVE_INPUT_H
 

@@ -75,7 +75,8 @@ struct options {
     "  --topology full|star|ring|chain  which PEs are joined (default full)\n" \
     "  --exchange gather|reduce  in a step PEs exchange every mode's\n" \
     "                    estimate (default: the serial filter's bits), or\n" \
-    "                    only a pool each: for chains Pi = diag + 1 v'\n"
+    "                    only a pool each: for chains that stay or jump\n" \
+    "                    anywhere alike, Pi = diag(lambda) + 1 v'\n"
 #define PORT_HELP \
     EXCHANGE_HELP \
     "  --timeout S       longest wait for an answer (default 2)\n" \

@@ -147,5 +147,8 @@ int out_folder(const char *path)
             *p = '/';
     }
     free(copy);
+    if (status == 0 && access(path, W_OK | X_OK) != 0)
+        status = complain(path, 0, NULL, "cannot write into the folder: %s",
+                          strerror(errno));
     return status;
 }

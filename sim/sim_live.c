@@ -122,6 +122,8 @@ static int compare(const struct estimates *e, const struct live_input *live,
         same = estimates_same(&serial, e);
         print_report(e, &serial, live, same);
         status = save_all(e, live, model, options);
+        if (status == 0)
+            printf("estimates and record: %s\n", options->out);
         if (!same && options->exchange == JL_EXCHANGE_GATHER)
             status = 1;
     }
