@@ -72,6 +72,9 @@ typedef struct jl_link_count {
     unsigned long stale;        /* frames of or for another session         */
 } jl_link_count;
 
+/* *sum += *count, for a node of several links. */
+void jl_link_count_add(jl_link_count *sum, const jl_link_count *count);
+
 /* Longest of the times in a jl_link_config: 67 s. */
 #define JL_LINK_MAX_US 67108864L
 

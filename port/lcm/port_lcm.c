@@ -534,18 +534,8 @@ jl_link_count jl_lcm_count(const jl_lcm *lcm)
     int i;
 
     memset(&sum, 0, sizeof sum);
-    for (i = 0; i < lcm->nodes; i++) {
-        const jl_link_count *c = &lcm->peers[i].link.count;
-
-        sum.sent += c->sent;
-        sum.resent += c->resent;
-        sum.acks += c->acks;
-        sum.received += c->received;
-        sum.doubled += c->doubled;
-        sum.early += c->early;
-        sum.refused += c->refused;
-        sum.stale += c->stale;
-    }
+    for (i = 0; i < lcm->nodes; i++)
+        jl_link_count_add(&sum, &lcm->peers[i].link.count);
     sum.refused += lcm->strays;
     return sum;
 }

@@ -33,6 +33,18 @@ int jl_link_init(jl_link *link, const jl_link_config *config,
     return JL_OK;
 }
 
+void jl_link_count_add(jl_link_count *sum, const jl_link_count *count)
+{
+    sum->sent += count->sent;
+    sum->resent += count->resent;
+    sum->acks += count->acks;
+    sum->received += count->received;
+    sum->doubled += count->doubled;
+    sum->early += count->early;
+    sum->refused += count->refused;
+    sum->stale += count->stale;
+}
+
 int jl_link_send(jl_link *link, const unsigned char *msg, int len)
 {
     int held = (int)jli_ahead(link->out_end, link->out_first);

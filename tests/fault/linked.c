@@ -310,18 +310,8 @@ jl_link_count linked_count(const linked *l)
     jl_link_count sum = { 0 };
     int i;
 
-    for (i = 0; i < l->config.nodes; i++) {
-        const jl_link_count *c = &l->peers[i].link.count;
-
-        sum.sent += c->sent;
-        sum.resent += c->resent;
-        sum.acks += c->acks;
-        sum.received += c->received;
-        sum.doubled += c->doubled;
-        sum.early += c->early;
-        sum.refused += c->refused;
-        sum.stale += c->stale;
-    }
+    for (i = 0; i < l->config.nodes; i++)
+        jl_link_count_add(&sum, &l->peers[i].link.count);
     return sum;
 }
 
