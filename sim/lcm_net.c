@@ -105,7 +105,7 @@ void lcm_say_refused(const struct traffic *traffic)
 int lcm_node_silent(const struct lcm_node *node,
                     const struct options *options)
 {
-    long us, most = options->timeout_us / 2;
+    long us, most = (long)silence_us(options) / 2;     /* four beats */
     int pe, silent = -1;
 
     for (pe = 0; pe < node->nodes - 1; pe++) {

@@ -32,7 +32,7 @@ void lcm_node_traffic(const struct lcm_node *node, struct traffic *traffic);
 void lcm_say_refused(const struct traffic *traffic);
 
 /* After a failure: the PE that has been silent for longest, and for half of the
- * timeout at least; -1: none. */
+ * timeout (and a quarter of a second) at least; -1: none. */
 int lcm_node_silent(const struct lcm_node *node,
                     const struct options *options);
 

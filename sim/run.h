@@ -45,8 +45,9 @@ jl_u32 run_fingerprint(const struct model *model,
 /* Octets of the longest message of the model, and of channels that hold it. */
 int run_max_len(const struct model *model);
 
-/* How long a PE waits for a message: longer than for silence (lcm_net.h), which
- * tells more surely who is dead. */
+/* How long a PE waits for a message: longer than until another counts as silent
+ * (lcm_net.c; unless the timeout is below that one's least), for silence tells
+ * more surely who is dead. */
 long run_message_us(const struct options *options);
 
 /* Messages that channels between PEs must hold, for none to wait. */
