@@ -20,7 +20,8 @@ static const struct {
     sizes_make *make;
 } who[] = {
     { "Eigen, fixed size", sizes_eigen },
-    { "jumplink, any size", sizes_jumplink },
+    { "jumplink, fixed size", sizes_fixed },
+    { "jumplink, any size", sizes_any },
     { "plain C, any size", sizes_plain }
 };
 #define WHO ((int)(sizeof who / sizeof *who))
@@ -175,7 +176,7 @@ static jl_real difference(int c, const struct sizes_estimate *a, jl_real la,
 /* Both forms of everybody, beside the library's Joseph form. */
 static void check(int c)
 {
-    struct sizes_filter *ours = sizes_jumplink(new_model(c), JOSEPH);
+    struct sizes_filter *ours = sizes_any(new_model(c), JOSEPH);
     int k, f, w;
 
     for (k = 0; k < STEPS; k++) {

@@ -40,7 +40,7 @@ struct sizes_filter {
 typedef struct sizes_filter *sizes_make(const struct sizes_model *model,
                                         enum sizes_form form);
 
-sizes_make sizes_jumplink, sizes_plain, sizes_eigen;
+sizes_make sizes_fixed, sizes_any, sizes_plain, sizes_eigen;
 
 #ifdef __cplusplus
 }

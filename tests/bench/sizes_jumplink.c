@@ -86,10 +86,9 @@ static void set_mode(jl_mode *mode, const struct sizes_model *model, int j)
     free(scratch);
 }
 
-struct sizes_filter *sizes_jumplink(const struct sizes_model *model,
-                                    enum sizes_form form)
+static struct sizes_filter *new_filter(const struct sizes_model *model,
+                                       const jl_kf_form *form)
 {
-    const jl_kf_form *forms[] = { &jl_kf_standard, &jl_kf_joseph };
     int M = model->M, n = model->n, j, status;
     struct jumplink_filter *f = calloc(1, sizeof *f);
 
@@ -102,16 +101,16 @@ struct sizes_filter *sizes_jumplink(const struct sizes_model *model,
     bench_must(f->modes != NULL, "memory");
     for (j = 0; j < M; j++)
         set_mode(&f->modes[j], model, j);
-    f->state = reals(JL_IMM_STATE(M, n));
+    f->state = reals(JL_IMM_STATE(M, n, model->m));
     f->scratch = reals(JL_IMM_SCRATCH(M, n, model->m)
                        + JL_KF_SCRATCH(n, model->m));
     if (model->kalman) {
-        status = jl_kf_init(&f->kf, f->modes, forms[form], f->state,
-                            JL_KF_STATE(n));
+        status = jl_kf_init(&f->kf, f->modes, form, f->state,
+                            JL_KF_STATE(n, model->m));
     } else {
-        status = jl_imm_init(&f->imm, M, f->modes, forms[form],
+        status = jl_imm_init(&f->imm, M, f->modes, form,
                              model->sticky ? JL_MIX_AUTO : JL_MIX_GENERAL,
-                             f->state, JL_IMM_STATE(M, n));
+                             f->state, JL_IMM_STATE(M, n, model->m));
         if (status == JL_OK)
             status = jl_imm_chain(&f->imm, model->Pi);
         bench_must(f->imm.sticky == model->sticky, "the kind of chain");
@@ -119,4 +118,20 @@ struct sizes_filter *sizes_jumplink(const struct sizes_model *model,
     bench_must(status == JL_OK, "the filter");
     start(&f->base);
     return &f->base;
+}
+
+static const jl_kf_form *const forms[] = { &jl_kf_standard, &jl_kf_joseph };
+
+struct sizes_filter *sizes_any(const struct sizes_model *model,
+                               enum sizes_form form)
+{
+    return new_filter(model, forms[form]);
+}
+
+struct sizes_filter *sizes_fixed(const struct sizes_model *model,
+                                 enum sizes_form form)
+{
+    const jl_kf_form *fixed = jl_kf_fixed(forms[form], model->n, model->m);
+
+    return fixed->n == 0 ? NULL : new_filter(model, fixed);
 }
