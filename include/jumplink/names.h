@@ -13,6 +13,7 @@
 #define jl_exp jl_exp_f32
 #define jl_log jl_log_f32
 #define jl_sincos jl_sincos_f32
+#define jl_atan2 jl_atan2_f32
 
 #define jl_mat_mul jl_mat_mul_f32
 #define jl_mat_mul_t jl_mat_mul_t_f32
