@@ -36,7 +36,7 @@ static int open_imm(struct bank *bank, const jl_kf_form *form)
     int M = bank->model->M, n = bank->model->n, m = bank->model->m;
     size_t size = sizeof(jl_real);
 
-    bank->mem = calloc((size_t)JL_IMM_STATE(M, n), size);
+    bank->mem = calloc((size_t)JL_IMM_STATE(M, n, m), size);
     bank->scratch = calloc((size_t)JL_IMM_SCRATCH(M, n, m), size);
     bank->Pi = calloc((size_t)(M * M), size);
     bank->x = calloc((size_t)(M * n), size);
@@ -45,7 +45,7 @@ static int open_imm(struct bank *bank, const jl_kf_form *form)
         || bank->x == NULL || bank->P == NULL)
         return -1;
     return jl_imm_init(&bank->imm, M, bank->modes, form, JL_MIX_AUTO,
-                       bank->mem, JL_IMM_STATE(M, n)) == JL_OK ? 0 : -1;
+                       bank->mem, JL_IMM_STATE(M, n, m)) == JL_OK ? 0 : -1;
 }
 
 int bank_open(struct bank *bank, const struct model *model,

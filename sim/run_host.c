@@ -16,7 +16,8 @@
 
 int run_is_channels(int status)
 {
-    return status <= JL_ETIMEOUT && status != JL_ECHAIN;
+    return status <= JL_ETIMEOUT && status != JL_ECHAIN
+        && status != JL_EGATE;
 }
 
 int run_failed(const struct data_file *data, long row, int status,

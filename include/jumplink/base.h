@@ -72,7 +72,8 @@ enum {
     JL_EMSG = -23,      /* a message that does not belong here              */
     JL_EMODEL = -24,    /* the PEs were given different models              */
     JL_ESILENT = -25,   /* the other end has not been heard for too long    */
-    JL_ECHAIN = -26     /* a chain that an all-reduce cannot serve          */
+    JL_ECHAIN = -26,    /* a chain that an all-reduce cannot serve          */
+    JL_EGATE = -27      /* ... or a gate                                    */
 };
 
 /* What a code means, in words: "innovation covariance S is not positive

@@ -41,16 +41,29 @@
 extern "C" {
 #endif
 
+/* What every mode rejects, the filter rejects (jl_imm_gate): the modes are only
+ * predicted, as if it were missing.  A gate of each mode by itself would be
+ * wrong: the mode that rejects avoids a bad likelihood, and wins.
+ *
+ * Modes may have different states (jl_imm_sizes): position and velocity in one,
+ * acceleration too in another.  In the filter every mode has all n components;
+ * those that a mode lacks have a stated prior, independent of the others, as
+ * the mode's estimate after every prediction.  So the certainty of a mode that
+ * has no acceleration does not leak into one that has.
+ */
+
 enum {                          /* how to mix */
     JL_MIX_AUTO = 0,            /* sticky where the chain allows it         */
     JL_MIX_GENERAL = 1          /* always the general sums                  */
 };
 
-/* Reals of state: two sets of estimates of M modes, the combined estimate,
- * Pi, and eight vectors over the modes. */
-#define JL_IMM_STATE(M, n) \
-    (2 * (M) * ((n) + (n) * (n)) + 2 * (n) + (n) * (n) + (M) * (M) + 8 * (M))
-#define JL_IMM_SCRATCH(M, n, m) (JL_KF_SCRATCH(n, m) + (M) + (n))
+/* Reals of state: two sets of estimates of M modes, the combined estimate (its
+ * covariance also as the form keeps it), Pi, the innovations, and ten vectors
+ * over the modes. */
+#define JL_IMM_STATE(M, n, m) \
+    (2 * (M) * ((n) + (n) * (n)) + 3 * (n) + 2 * (n) * (n) + (M) * (M) \
+     + (M) * (m) + 10 * (M))
+#define JL_IMM_SCRATCH(M, n, m) (JL_KF_SCRATCH(n, m) + (M) + 2 * (n))
 
 typedef struct jl_imm {
     int M, n, m;
@@ -60,18 +73,33 @@ typedef struct jl_imm {
     int sticky;                 /* Pi = diag(lambda) + 1 v' is used         */
     int stage;                  /* what may come next; see the calls        */
     int combined;               /* xhat, Phat belong to the present state   */
-    int missing;                /* the step under way has no measurement    */
+    int verdict;                /* on the measurement of the step under way:
+                                   accepted, missing, rejected (imm_stage.h) */
+
+    /* modes of different states; NULL: all have n */
+    const int *const *map;      /* [M][modes[j].n]                          */
+    const jl_real *prior_x;     /* [n]                                      */
+    const jl_real *prior_var;   /* [n]                                      */
+
+    /* gate */
+    jl_real gate;               /* a mode rejects above this nis; 0: no gate */
+    int most;                   /* rejections in a row; then accept         */
+    int run;                    /* ... so many by now; 0: the last counted  */
+    unsigned long rejected;     /* all since set                            */
 
     /* the state: valid between steps */
     jl_real *x;                 /* [M,n]                                    */
-    jl_real *P;                 /* [M,n,n]                                  */
+    jl_real *P;                 /* [M,n,n] as the form keeps it: jl_imm_cov */
     jl_real *logmu;             /* [M]                                      */
     jl_real *mu;                /* [M] exp(logmu)                           */
 
     /* results of combine and weigh */
     jl_real *xhat;              /* [n]                                      */
-    jl_real *Phat;              /* [n,n]                                    */
+    jl_real *Phat;              /* [n,n] a covariance, in any form          */
+    jl_real *Shat;              /* [n,n] ... as the form keeps it           */
     jl_real loglik;             /* of the last measurement                  */
+    jl_real *nis_mean;          /* [M] mean nis of those accepted since set */
+    unsigned long accepted;     /* ... so many                              */
 
     /* the step under way: mixed, then predicted, then updated */
     jl_real *xw;                /* [M,n]                                    */
@@ -79,8 +107,11 @@ typedef struct jl_imm {
     jl_real *logc;              /* [M] predicted log-probabilities          */
     jl_real *c;                 /* [M] exp(logc)                            */
     jl_real *l;                 /* [M] log-likelihoods                      */
+    jl_real *nis;               /* [M] nu' S^-1 nu; above the gate: xw, Pw are
+                                   predicted only, until judge              */
+    jl_real *nu;                /* [M,m] innovations                        */
     jl_real *e;                 /* [M] work                                 */
-    jl_real *d;                 /* [n] work                                 */
+    jl_real *d;                 /* [2n] work                                */
 
     /* the chain */
     jl_real *Pi;                /* [M,M]                                    */
@@ -89,12 +120,31 @@ typedef struct jl_imm {
 } jl_imm;
 
 /* Bind a filter to its modes, form and memory: modes [M] of equal n and m,
- * mem [cap] reals, cap >= JL_IMM_STATE(M, n); all outlive the filter.  Pi is
- * the identity, mu uniform, x = 0, P = I in every mode.
- * Returns JL_OK, JL_EDIM (M outside 1..JL_MAX_MODES, unequal sizes, mixing),
- * JL_ENOMEM; *imm is untouched on error. */
+ * mem [cap] reals, cap >= JL_IMM_STATE(M, n, m); all outlive the filter.  Pi is
+ * the identity, mu uniform, x = 0, P = I in every mode; no gate.
+ * Returns JL_OK, JL_EDIM (M outside 1..JL_MAX_MODES, unequal sizes, a form for
+ * other sizes, mixing), JL_ENOMEM; *imm is untouched on error. */
 int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
                 const jl_kf_form *form, int mixing, jl_real *mem, int cap);
+
+/* The same with modes of different states, n components in all: mode j has the
+ * components map[j][0] < map[j][1] < .. < n (modes[j].n of them; map[j] NULL:
+ * all n), and of the others the prior mean prior_x [n] and variance prior_var
+ * [n] >= 0.  All arrays outlive the filter.
+ * Returns as jl_imm_init, JL_EDIM for a map that is not as said too, and
+ * JL_ENONFINITE or JL_ERANGE (a variance below 0) for a prior. */
+int jl_imm_init_sizes(jl_imm *imm, int M, int n, const jl_mode *modes,
+                      const int *const *map, const jl_real *prior_x,
+                      const jl_real *prior_var, const jl_kf_form *form,
+                      int mixing, jl_real *mem, int cap);
+
+/* Gate: as jl_kf_gate, for a measurement whose nis is above `nis` in every mode
+ * that is possible.
+ * Returns JL_OK, or JL_ERANGE (nis not finite or below 0, most below 0). */
+int jl_imm_gate(jl_imm *imm, jl_real nis, int most);
+
+/* The covariance P [n,n] of mode j's present estimate, in any form. */
+void jl_imm_cov(const jl_imm *imm, int j, jl_real *P);
 
 /* Set the chain: Pi [M,M], rows sum to 1 (copied).  May be called between any
  * two steps, so a chain that depends on the time step is set before each.
@@ -102,7 +152,8 @@ int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
 int jl_imm_chain(jl_imm *imm, const jl_real *Pi);
 
 /* Set the state: x [M,n], P [M,n,n], mu [M] (copied); scratch
- * [JL_IMM_SCRATCH(M, n, m)].  A probability of 0 is allowed.
+ * [JL_IMM_SCRATCH(M, n, m)].  A probability of 0 is allowed.  Of components
+ * that a mode lacks, the prior is set.
  * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF, JL_EPROB; unchanged on
  * error. */
 int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,
@@ -114,7 +165,7 @@ int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,
  * JL_ESINGULAR; the filter is then as before the step. */
 int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch);
 
-/* The four stages, scratch as above, in this order; mix may be called at any
+/* The stages, scratch as above, in this order; mix may be called at any
  * time and starts the step anew; combine combines the present state and may be
  * called at any time.
  * Returns: as jl_imm_step, and JL_EORDER for filter without mix, or weigh
@@ -126,17 +177,21 @@ void jl_imm_combine(jl_imm *imm);
 
 /* The pieces of mix and filter, for filters spread over several processors:
  * mix = foresee, then mix_mode for every j; filter = predict_mode and
- * update_mode for every j.  A processor does so for the modes it owns; l[j],
- * xw[j], Pw[j] of the others come to it by message; then, if no mode has failed
- * anywhere, it calls weigh.  (It must own a mode: update_mode opens weigh.)
+ * update_mode for every j, then judge.  A processor does so for the modes it
+ * owns; l[j], nis[j], xw[j], Pw[j] of the others come to it by message; then, if
+ * no mode has failed anywhere, it calls judge and weigh.  (It must own a mode:
+ * update_mode opens judge and weigh.)
  * 0 <= j < M; scratch as above.  foresee computes c of all modes from mu of all
  * modes; mix_mode, predict_mode and update_mode leave their result in xw[j],
- * Pw[j], and l[j]. */
+ * Pw[j], and l[j], nis[j], nu[j].  A mode above the gate stays as predicted;
+ * judge, when the measurement is accepted in spite of it, updates it: so every
+ * processor does the same for all modes, whoever owns them. */
 void jl_imm_foresee(jl_imm *imm);
 void jl_imm_mix_mode(jl_imm *imm, int j, jl_real *scratch);
 int jl_imm_predict_mode(jl_imm *imm, int j, jl_real *scratch);
 int jl_imm_update_mode(jl_imm *imm, int j, const jl_real *z,
                        jl_real *scratch);
+int jl_imm_judge(jl_imm *imm, const jl_real *z, jl_real *scratch);
 
 #ifdef __cplusplus
 }

@@ -6,14 +6,17 @@
  *               P = (I - K H) P- (I - K H)' + K R K'      form joseph
  *               P = P- - K S K'                           form standard
  *     loglik    log N(nu; 0, S)
+ *     nis       nu' S^-1 nu, the normalised innovation squared: chi-square with
+ *               m degrees of freedom if the model is right
  *
  * The forms are equal in exact arithmetic (Bucy and Joseph 1968; the standard
  * form is computed as P- - Y'Y with Y = L^-1 H P-, S = L L').  Joseph keeps P
  * positive semidefinite where measurements are far better than the prior, as
  * long as R / (H P- H') is above the number type's epsilon; standard is cheaper
- * and fine otherwise.  Leading multiplications: predict 3/2 n^3; update joseph
- * 3/2 n^3 + 5/2 n^2 m, standard 3/2 n^2 m.  A form is a const table of
- * functions: a program that names one does not link the other.
+ * and fine otherwise; sqrt keeps factors of P and holds where neither does.
+ * Leading multiplications: predict 3/2 n^3; update joseph 3/2 n^3 + 5/2 n^2 m,
+ * standard 3/2 n^2 m.  A form is a const table of functions: a program that
+ * names one does not link the other.
  */
 #ifndef JL_KF_H
 #define JL_KF_H
@@ -25,39 +28,102 @@
 extern "C" {
 #endif
 
-/* One step's pieces, on arrays: x [n], P [n,n]; outputs must not overlap
- * inputs.
+/* --- forms ------------------------------------------------------------- */
+
+/* How a form keeps a covariance S [n,n], and the sums over estimates (x, S)
+ * that an IMM makes of it.  w: weights >= 0 that sum to 1; d = x - mean.
+ *     take    S = P, a covariance; scratch [n n + 2 n]; S may be P
+ *     give    P = the covariance that S stands for
+ *     pool    mean = sum w_i x_i, S = sum w_i (S_i + d_i d_i') over M estimates
+ *             x [M,n], Ss [M,n,n]; scratch [2 n]
+ *     blend   the same of two: a (x1, S1) + b (x2, S2) + a b d d', d = x1 - x2;
+ *             x, S may be x1, S1; scratch [2 n]
+ *     part    S [k,k] = rows and columns map[0] < map[1] < .. of Sn [n,n];
+ *             scratch [n]
+ *     whole   ... and back: Sn [n,n] from S [k,k], with the variances var [n]
+ *             for what the map leaves out
+ * These cannot fail. */
+typedef struct jl_cov {
+    int factored;               /* 0: S is P.  1: a factor, U' D U of jl_mat_ud
+                                   with zeros below the diagonal            */
+    void (*take)(jl_real *S, const jl_real *P, jl_real *scratch, int n);
+    void (*give)(jl_real *P, const jl_real *S, int n);
+    void (*pool)(jl_real *mean, jl_real *S, const jl_real *w, const jl_real *x,
+                 const jl_real *Ss, jl_real *scratch, int M, int n);
+    void (*blend)(jl_real *x, jl_real *S, jl_real a, const jl_real *x1,
+                  const jl_real *S1, jl_real b, const jl_real *x2,
+                  const jl_real *S2, jl_real *scratch, int n);
+    void (*part)(jl_real *S, const jl_real *Sn, const int *map,
+                 jl_real *scratch, int k, int n);
+    void (*whole)(jl_real *Sn, const jl_real *S, const int *map,
+                  const jl_real *var, int k, int n);
+} jl_cov;
+
+extern const jl_cov jl_cov_full;        /* P itself: forms joseph, standard */
+extern const jl_cov jl_cov_ud;          /* U' D U: forms sqrt, unscented    */
+
+/* What an update tells besides the estimate. */
+typedef struct jl_innovation {
+    jl_real loglik;             /* log N(nu; 0, S)                          */
+    jl_real nis;                /* nu' S^-1 nu                              */
+    jl_real *nu;                /* [m] z - h(x-); the caller's memory       */
+} jl_innovation;
+
+/* One step's pieces, on arrays: x [n], P [n,n] as `cov` keeps it; outputs must
+ * not overlap inputs; scratch [JL_FORM_SCRATCH(n, m)].
  *     predict   returns JL_OK or JL_ENONFINITE
- *     update    *loglik is set; returns JL_OK, JL_ESINGULAR, JL_ENONFINITE
- * On error the outputs are undefined, and no other array has changed. */
+ *     update    *innovation is set; returns JL_OK, JL_ESINGULAR, JL_ENONFINITE
+ * or the code of a nonlinear mode's function.  On error the outputs are
+ * undefined, and no other array has changed. */
 typedef struct jl_kf_form {
     int (*predict)(jl_real *xp, jl_real *Pp, const jl_mode *mode,
                    const jl_real *x, const jl_real *P, jl_real *scratch);
-    int (*update)(jl_real *x, jl_real *P, jl_real *loglik,
+    int (*update)(jl_real *x, jl_real *P, jl_innovation *innovation,
                   const jl_mode *mode, const jl_real *xp, const jl_real *Pp,
                   const jl_real *z, jl_real *scratch);
+    const jl_cov *cov;
+    int n, m;                   /* the sizes it is for; 0: any              */
 } jl_kf_form;
 
 extern const jl_kf_form jl_kf_joseph;
 extern const jl_kf_form jl_kf_standard;
+extern const jl_kf_form jl_kf_sqrt;     /* factors U' D U                   */
+extern const jl_kf_form jl_kf_unscented;        /* sigma points; factors    */
 
-/* Reals of state (x, P) and of scratch.  Scratch means nothing between calls
- * and may be shared by all filters of a thread. */
-#define JL_KF_STATE(n) ((n) + (n) * (n))
+#define JL_FORM_SCRATCH(n, m) \
+    (3 * (n) * (n) + 4 * (n) * (m) + 2 * (m) * (m) + 5 * ((n) + (m)))
+
+/* --- the filter -------------------------------------------------------- */
+
+/* Reals of state (x, P, nu) and of scratch.  Scratch means nothing between
+ * calls and may be shared by all filters of a thread. */
+#define JL_KF_STATE(n, m) ((n) + (n) * (n) + (m))
 #define JL_KF_SCRATCH(n, m) \
-    (2 * ((n) + (n) * (n)) + 2 * (n) * (n) + 2 * (n) * (m) + (m) * (m) \
-     + 2 * (m))
+    (2 * ((n) + (n) * (n)) + (m) + JL_FORM_SCRATCH(n, m))
 
 typedef struct jl_kf {
     const jl_mode *mode;
     const jl_kf_form *form;
     jl_real *x;                 /* [n]                                      */
-    jl_real *P;                 /* [n,n]                                    */
+    jl_real *P;                 /* [n,n] as the form keeps it: jl_kf_cov    */
+
+    /* of the last measurement */
+    jl_innovation innovation;
+    jl_real nis_mean;           /* mean nis of those accepted since set     */
+    unsigned long accepted;     /* ... so many                              */
+
+    /* gate */
+    jl_real gate;               /* reject above this nis; 0: accept all     */
+    int most;                   /* rejections in a row; then accept         */
+    int run;                    /* ... so many by now; 0: the last counted  */
+    unsigned long rejected;     /* all since set                            */
 } jl_kf;
 
 /* Bind a filter to its mode, form and memory: mem [cap], cap >=
- * JL_KF_STATE(mode->n); mode, form and mem outlive the filter.  x = 0, P = I.
- * Returns JL_OK or JL_ENOMEM; *kf is untouched on error. */
+ * JL_KF_STATE(n, m) of the mode; mode, form and mem outlive the filter.  x = 0,
+ * P = I, no gate.
+ * Returns JL_OK, JL_EDIM (a form for other sizes) or JL_ENOMEM; *kf is
+ * untouched on error. */
 int jl_kf_init(jl_kf *kf, const jl_mode *mode, const jl_kf_form *form,
                jl_real *mem, int cap);
 
@@ -67,14 +133,31 @@ int jl_kf_init(jl_kf *kf, const jl_mode *mode, const jl_kf_form *form,
 int jl_kf_set(jl_kf *kf, const jl_real *x, const jl_real *P,
               jl_real *scratch);
 
+/* The covariance P [n,n] of the present estimate, in any form. */
+void jl_kf_cov(const jl_kf *kf, jl_real *P);
+
+/* Gate: a measurement whose nis is above `nis` is rejected, which is as if it
+ * were missing; but after `most` rejections in a row the next is accepted, for
+ * then it is the filter that is wrong.  nis 0: no gate.  With probability p a
+ * good measurement passes the chi-square quantile:
+ *     m           1      2      3      4      5      6
+ *     p 0.99    6.63   9.21  11.34  13.28  15.09  16.81
+ *     p 0.999  10.83  13.82  16.27  18.47  20.52  22.46
+ * Returns JL_OK, or JL_ERANGE (nis not finite or below 0, most below 0). */
+int jl_kf_gate(jl_kf *kf, jl_real nis, int most);
+#define JL_GATE_MOST 5          /* what `most` usually is */
+
 /* One time step; scratch [JL_KF_SCRATCH(n, m)].
- * Returns JL_OK or JL_ENONFINITE; unchanged on error. */
+ * Returns JL_OK, JL_ENONFINITE, or the code of a nonlinear mode's function;
+ * unchanged on error. */
 int jl_kf_predict(jl_kf *kf, jl_real *scratch);
 
 /* One measurement z [m]; NULL: it is missing, the estimate stays as it is and
- * *loglik is 0.  loglik may be NULL.
- * Returns JL_OK, JL_ENONFINITE (z, or a result), JL_ESINGULAR; on error
- * neither the filter nor *loglik has changed. */
+ * *loglik is 0, and so it is with one that the gate rejects (kf->run > 0).
+ * loglik may be NULL.
+ * Returns JL_OK, JL_ENONFINITE (z, or a result), JL_ESINGULAR, or the code of a
+ * nonlinear mode's function; on error neither the filter nor *loglik has
+ * changed. */
 int jl_kf_update(jl_kf *kf, jl_real *loglik, const jl_real *z,
                  jl_real *scratch);
 

@@ -17,25 +17,39 @@
 extern "C" {
 #endif
 
-/* Reals of memory for a mode: F, H, R, and from G, Q, w_bar only what the
- * filters need, G Q G' and G w_bar; and G and Q once more for work. */
+/* Reals of memory for a mode: F, H, R; of G, Q, w_bar what the filters need,
+ * G Q G' and G w_bar; and the noises as factors, for forms that keep factors. */
 #define JL_MODE_MEM(n, m, p) \
-    (2 * (n) * (n) + (n) + (m) * (n) + (m) * (m) + (n) * (p) + (p) * (p))
+    (2 * (n) * (n) + (n) + (m) * (n) + 2 * (m) * (m) + (n) * (p) + (p))
 
-typedef struct jl_mode {
+typedef struct jl_mode jl_mode;
+struct jl_nonlinear;
+
+struct jl_mode {
     int n, m, p;                /* states, measurements, noises             */
     jl_real *F;                 /* [n,n]                                    */
     jl_real *W;                 /* [n,n] G Q G', process noise              */
     jl_real *u;                 /* [n]   G w_bar, its mean                  */
     jl_real *H;                 /* [m,n]                                    */
     jl_real *R;                 /* [m,m]                                    */
-    jl_real *G;                 /* [n,p]                                    */
-    jl_real *Q;                 /* [p,p]                                    */
-} jl_mode;
+    jl_real *V;                 /* [m,m] R = U' D U as jl_mat_ud has it     */
+    jl_real *N;                 /* [p,n] rows N_k of noise, and ...         */
+    jl_real *q;                 /* [p]   their weights: W = sum q_k N_k' N_k */
+
+    const struct jl_nonlinear *nonlinear;       /* or NULL: F x + u, H x    */
+    int (*move)(jl_real *xp, jl_real *F, const jl_mode *mode,
+                const jl_real *x, jl_real *scratch);    /* jl_mode_move     */
+    int (*sense)(jl_real *nu, jl_real *H, const jl_mode *mode,
+                 const jl_real *z, const jl_real *x,
+                 jl_real *scratch);                     /* jl_mode_sense;
+                                   both NULL if linear, so that only programs
+                                   with nonlinear modes link what these need */
+};
 
 /* Reals of scratch for jl_mode_set. */
 #define JL_MODE_SCRATCH(n, m, p) \
-    ((n) * (n) + (n) * (p) + (m) * (m) + (p) * (p))
+    (2 * (n) * (n) + 2 * (n) * (p) + (n) + 2 * (m) * (m) + 2 * (p) * (p) \
+     + 2 * (m) + 2 * (p))
 
 /* Bind a mode to its memory: mem [cap], cap >= JL_MODE_MEM(n, m, p); all
  * matrices are zero until jl_mode_set or jl_mode_motion fills them.
@@ -51,6 +65,48 @@ int jl_mode_init(jl_mode *mode, int n, int m, int p, jl_real *mem, int cap);
 int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
                 const jl_real *Q, const jl_real *w_bar, const jl_real *H,
                 const jl_real *R, jl_real *scratch);
+
+/* --- nonlinear modes --------------------------------------------------- */
+
+/* What a mode does that no matrix says, with the noises of its mode:
+ *     x(k+1) = f(x(k)) + G (w + w_bar),     z(k) = h(x(k)) + v
+ * Each function returns JL_OK, or a negative code of base.h that ends the step
+ * (a bearing has no value at range 0: JL_ERANGE); context is handed to each.
+ * The forms joseph, standard and sqrt linearise f at the estimate and h at the
+ * prediction (extended Kalman filter); the form unscented does not. */
+typedef struct jl_nonlinear {
+    /* y [n] = f(x), x [n]; NULL: the mode's F x */
+    int (*f)(jl_real *y, const jl_real *x, void *context);
+    /* F [n,n] = df/dx at x; NULL: by central differences */
+    int (*jacobian_f)(jl_real *F, const jl_real *x, void *context);
+    /* z [m] = h(x), x [n]; NULL: the mode's H x */
+    int (*h)(jl_real *z, const jl_real *x, void *context);
+    /* H [m,n] = dh/dx at x; NULL: by central differences */
+    int (*jacobian_h)(jl_real *H, const jl_real *x, void *context);
+    /* d [m] = a - b, with angles brought to [-pi, pi); d may be a or b.  NULL:
+     * the plain difference. */
+    void (*residual)(jl_real *d, const jl_real *a, const jl_real *b,
+                     void *context);
+    void *context;
+} jl_nonlinear;
+
+/* Make a mode, which has its noises by jl_mode_set or jl_mode_motion,
+ * nonlinear; NULL makes it linear again.  *nonlinear outlives the mode, which
+ * later calls of jl_mode_set and jl_mode_motion leave nonlinear. */
+void jl_mode_nonlinear(jl_mode *mode, const jl_nonlinear *nonlinear);
+
+/* x- and, unless F is NULL, the Jacobian of a mode at x:
+ *     xp [n] = f(x) + u, or F x + u;  F [n,n];  x [n];  scratch [3 n]
+ * A numerical Jacobian has steps of eps^(1/3) max(|x_i|, 1).
+ * Returns JL_OK, or the code of a function of the mode's. */
+int jl_mode_move(jl_real *xp, jl_real *F, const jl_mode *mode,
+                 const jl_real *x, jl_real *scratch);
+
+/* The innovation and, unless H is NULL, the Jacobian of a mode at x:
+ *     nu [m] = z - h(x), or z - H x;  H [m,n];  z [m];  scratch [n + 2 m]
+ * Returns JL_OK, or the code of a function of the mode's. */
+int jl_mode_sense(jl_real *nu, jl_real *H, const jl_mode *mode,
+                  const jl_real *z, const jl_real *x, jl_real *scratch);
 
 /* --- catalogue --------------------------------------------------------- */
 

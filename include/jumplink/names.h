@@ -22,6 +22,8 @@
 #define jl_mat_cholesky jl_mat_cholesky_f32
 #define jl_mat_cholesky_solve jl_mat_cholesky_solve_f32
 #define jl_mat_lower_solve jl_mat_lower_solve_f32
+#define jl_mat_ud jl_mat_ud_f32
+#define jl_mat_ud_product jl_mat_ud_product_f32
 #define jl_mat_pack jl_mat_pack_f32
 #define jl_mat_unpack jl_mat_unpack_f32
 #define jl_vec_within jl_vec_within_f32
@@ -29,20 +31,32 @@
 
 #define jl_mode_init jl_mode_init_f32
 #define jl_mode_set jl_mode_set_f32
+#define jl_mode_nonlinear jl_mode_nonlinear_f32
+#define jl_mode_move jl_mode_move_f32
+#define jl_mode_sense jl_mode_sense_f32
 #define jl_mode_motion jl_mode_motion_f32
 #define jl_motion_start jl_motion_start_f32
 #define jl_chain_sojourn jl_chain_sojourn_f32
 #define jl_chain_check jl_chain_check_f32
 
+#define jl_cov_full jl_cov_full_f32
+#define jl_cov_ud jl_cov_ud_f32
 #define jl_kf_joseph jl_kf_joseph_f32
 #define jl_kf_standard jl_kf_standard_f32
+#define jl_kf_sqrt jl_kf_sqrt_f32
+#define jl_kf_unscented jl_kf_unscented_f32
 #define jl_kf_init jl_kf_init_f32
 #define jl_kf_set jl_kf_set_f32
+#define jl_kf_cov jl_kf_cov_f32
+#define jl_kf_gate jl_kf_gate_f32
 #define jl_kf_predict jl_kf_predict_f32
 #define jl_kf_update jl_kf_update_f32
 #define jl_kf_step jl_kf_step_f32
 
 #define jl_imm_init jl_imm_init_f32
+#define jl_imm_init_sizes jl_imm_init_sizes_f32
+#define jl_imm_gate jl_imm_gate_f32
+#define jl_imm_cov jl_imm_cov_f32
 #define jl_imm_chain jl_imm_chain_f32
 #define jl_imm_set jl_imm_set_f32
 #define jl_imm_step jl_imm_step_f32
@@ -54,6 +68,7 @@
 #define jl_imm_mix_mode jl_imm_mix_mode_f32
 #define jl_imm_predict_mode jl_imm_predict_mode_f32
 #define jl_imm_update_mode jl_imm_update_mode_f32
+#define jl_imm_judge jl_imm_judge_f32
 
 #define jl_put_real jl_put_real_f32
 #define jl_get_real jl_get_real_f32

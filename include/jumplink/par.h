@@ -190,7 +190,8 @@ int jl_par_serve(jl_par *par, jl_real *scratch);
 /* One step, when the measurement is already on every PE and every PE calls
  * this: returns on all of them that own modes the same JL_OK or code of the
  * first mode that failed, as jl_imm_step, or JL_ECHAIN (an all-reduce and a
- * chain that is not sticky); or the error of the channel that failed.  The
+ * chain that is not sticky), JL_EGATE (an all-reduce and a gate: a PE's pool
+ * would depend on the verdict of all); or the error of the channel that failed.  The
  * combined estimate is computed on PE0 (on the others call jl_imm_combine; an
  * all-reduce computes it on all, and jl_imm_combine is of no use).
  * After the error of a channel the PEs may differ: the run is over. */

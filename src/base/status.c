@@ -59,6 +59,8 @@ const char *jl_status_text(int status)
     case JL_ECHAIN:
         return "the chain is not diag(lambda) + 1 v', which an all-reduce "
                "needs";
+    case JL_EGATE:
+        return "a gate, which an all-reduce cannot serve";
     default:
         return "unknown status";
     }

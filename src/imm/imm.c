@@ -27,54 +27,137 @@ static void layout(jl_imm *imm, jl_real *mem)
     imm->Pw = imm->xw + M * n;
     imm->xhat = imm->Pw + M * n * n;
     imm->Phat = imm->xhat + n;
-    imm->d = imm->Phat + n * n;
-    imm->Pi = imm->d + n;
+    imm->Shat = imm->form->cov->factored ? imm->Phat + n * n : imm->Phat;
+    imm->d = imm->Phat + 2 * n * n;
+    imm->Pi = imm->d + 2 * n;
     imm->logmu = imm->Pi + M * M;
     imm->mu = imm->logmu + M;
     imm->logc = imm->mu + M;
     imm->c = imm->logc + M;
     imm->l = imm->c + M;
-    imm->e = imm->l + M;
+    imm->nis = imm->l + M;
+    imm->nis_mean = imm->nis + M;
+    imm->e = imm->nis_mean + M;
     imm->lambda = imm->e + M;
     imm->v = imm->lambda + M;
+    imm->nu = imm->v + M;
 }
 
-int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
-                const jl_kf_form *form, int mixing, jl_real *mem, int cap)
+/* Whether form and map fit the modes; n components in all. */
+static int sizes_fit(int M, int n, const jl_mode *modes,
+                     const int *const *map, const jl_kf_form *form)
 {
-    int i, j, n;
+    int j, i;
 
-    if (M < 1 || M > JL_MAX_MODES
-        || (mixing != JL_MIX_AUTO && mixing != JL_MIX_GENERAL))
+    if (form->n != 0 && (form->n != n || form->m != modes[0].m))
+        return 0;
+    for (j = 0; j < M; j++) {
+        const int *at = map != NULL ? map[j] : NULL;
+
+        if (modes[j].m != modes[0].m || modes[j].n > n
+            || (modes[j].n < n && (at == NULL || form->n != 0)))
+            return 0;
+        for (i = 0; at != NULL && i < modes[j].n; i++)
+            if (at[i] <= (i > 0 ? at[i - 1] : -1) || at[i] >= n)
+                return 0;
+    }
+    return 1;
+}
+
+static int check_prior(const jl_real *x, const jl_real *var, int n)
+{
+    int i;
+
+    if (!jl_vec_within(x, n, JL_LARGE)
+        || !jl_vec_within(var, n, JL_LARGE * JL_LARGE))
+        return JL_ENONFINITE;
+    for (i = 0; i < n; i++)
+        if (var[i] < 0)
+            return JL_ERANGE;
+    return JL_OK;
+}
+
+/* Of components that mode j lacks, the prior. */
+static void set_prior(jl_imm *imm, int j, jl_real *scratch)
+{
+    int n = imm->n, k = imm->modes[j].n;
+    jl_real *x = imm->x + j * n, *P = imm->P + j * n * n;
+
+    if (imm->map == NULL)
+        return;
+    jli_own_states(scratch, scratch + k, imm, j, x, P, scratch + k + k * k);
+    jli_all_states(x, P, imm, j, scratch, scratch + k);
+}
+
+static void forget(jl_imm *imm)
+{
+    memset(imm->nis, 0, (size_t)(2 * imm->M) * sizeof *imm->nis);
+    memset(imm->nu, 0, (size_t)(imm->M * imm->m) * sizeof *imm->nu);
+    imm->accepted = 0;
+    imm->rejected = 0;
+    imm->run = 0;
+    imm->loglik = 0;
+    imm->stage = JLI_IDLE;
+}
+
+int jl_imm_init_sizes(jl_imm *imm, int M, int n, const jl_mode *modes,
+                      const int *const *map, const jl_real *prior_x,
+                      const jl_real *prior_var, const jl_kf_form *form,
+                      int mixing, jl_real *mem, int cap)
+{
+    int i, j, status = JL_OK;
+
+    if (M < 1 || M > JL_MAX_MODES || n < 1 || n > JL_MAX_STATES
+        || (mixing != JL_MIX_AUTO && mixing != JL_MIX_GENERAL)
+        || !sizes_fit(M, n, modes, map, form))
         return JL_EDIM;
-    n = modes[0].n;
-    for (j = 1; j < M; j++)
-        if (modes[j].n != n || modes[j].m != modes[0].m)
-            return JL_EDIM;
-    if (cap < JL_IMM_STATE(M, n))
+    if (map != NULL)
+        status = check_prior(prior_x, prior_var, n);
+    if (status != JL_OK)
+        return status;
+    if (cap < JL_IMM_STATE(M, n, modes[0].m))
         return JL_ENOMEM;
 
-    memset(mem, 0, (size_t)JL_IMM_STATE(M, n) * sizeof *mem);
+    memset(mem, 0, (size_t)JL_IMM_STATE(M, n, modes[0].m) * sizeof *mem);
+    memset(imm, 0, sizeof *imm);
     imm->M = M;
     imm->n = n;
     imm->m = modes[0].m;
     imm->modes = modes;
     imm->form = form;
     imm->mixing = mixing;
+    imm->map = map;
+    imm->prior_x = prior_x;
+    imm->prior_var = prior_var;
     layout(imm, mem);
     for (j = 0; j < M; j++) {
         imm->Pi[j * M + j] = 1;
         imm->lambda[j] = 1;                     /* v = 0 */
-        for (i = 0; i < n; i++)
+        for (i = 0; i < n; i++)         /* a covariance, and a factor of it */
             imm->P[j * n * n + i * (n + 1)] = 1;
+        set_prior(imm, j, imm->xw);
     }
     imm->sticky = mixing == JL_MIX_AUTO;
-    imm->stage = JLI_IDLE;
-    imm->missing = 0;
-    imm->loglik = 0;
+    forget(imm);
     set_mu(imm, NULL);
     jl_imm_combine(imm);
     return JL_OK;
+}
+
+int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
+                const jl_kf_form *form, int mixing, jl_real *mem, int cap)
+{
+    return M < 1 ? JL_EDIM
+        : jl_imm_init_sizes(imm, M, modes[0].n, modes, NULL, NULL, NULL, form,
+                            mixing, mem, cap);
+}
+
+void jl_imm_cov(const jl_imm *imm, int j, jl_real *P)
+{
+    int n = imm->n;
+
+    JL_ASSERT(j >= 0 && j < imm->M);
+    imm->form->cov->give(P, imm->P + j * n * n, n);
 }
 
 /* v_j, the common entry of column j off the diagonal, or -1 if there is none:
@@ -129,13 +212,12 @@ int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,
     if (status != JL_OK)
         return status;
     jli_copy(imm->x, x, M * n);
-    for (j = 0; j < M; j++) {           /* exactly symmetric from here on */
-        jl_mat_pack(scratch, P + j * n * n, n);
-        jl_mat_unpack(imm->P + j * n * n, scratch, n);
+    for (j = 0; j < M; j++) {
+        imm->form->cov->take(imm->P + j * n * n, P + j * n * n, scratch, n);
+        set_prior(imm, j, scratch);
     }
     set_mu(imm, mu);
-    imm->loglik = 0;
-    imm->stage = JLI_IDLE;
+    forget(imm);
     jl_imm_combine(imm);
     return JL_OK;
 }

@@ -91,44 +91,24 @@ static void sticky_shares(jl_real *w, const jl_imm *imm, int j)
 
 /* --- mixing -------------------------------------------------------------- */
 
-/* a (x_j, P_j) + b (xhat, Phat) + a b d d' */
-static void mix_sticky(jl_real *x0, jl_real *P0, const jl_imm *imm, int j,
-                       jl_real *d)
-{
-    int n = imm->n, r, s;
-    const jl_real *x = imm->x + j * n, *P = imm->P + j * n * n;
-    jl_real w[2], a, b;
-
-    sticky_shares(w, imm, j);
-    a = w[0];
-    b = w[1];
-    for (r = 0; r < n; r++) {
-        x0[r] = a * x[r] + b * imm->xhat[r];
-        d[r] = x[r] - imm->xhat[r];
-    }
-    for (r = 0; r < n; r++)
-        for (s = r; s < n; s++) {
-            P0[r * n + s] = a * P[r * n + s] + b * imm->Phat[r * n + s]
-                + a * b * (d[r] * d[s]);
-            P0[s * n + r] = P0[r * n + s];
-        }
-}
-
 void jl_imm_mix_mode(jl_imm *imm, int j, jl_real *scratch)
 {
+    const jl_cov *cov = imm->form->cov;
     int M = imm->M, n = imm->n;
+    const jl_real *x = imm->x + j * n, *P = imm->P + j * n * n;
     jl_real *x0 = imm->xw + j * n, *P0 = imm->Pw + j * n * n;
-    jl_real *w = scratch, *d = w + M;
+    jl_real *w = scratch;
 
     JL_ASSERT(j >= 0 && j < M);
     if (imm->logc[j] < -JL_REAL_MAX) {          /* cannot be entered */
-        jli_copy(x0, imm->x + j * n, n);
-        jli_copy(P0, imm->P + j * n * n, n * n);
+        jli_copy(x0, x, n);
+        jli_copy(P0, P, n * n);
     } else if (imm->sticky) {
-        mix_sticky(x0, P0, imm, j, d);
+        sticky_shares(w, imm, j);
+        cov->blend(x0, P0, w[0], x, P, w[1], imm->xhat, imm->Shat, w + 2, n);
     } else {
         shares(w, imm, j);
-        jli_pool(x0, P0, w, imm->x, imm->P, d, M, n);
+        cov->pool(x0, P0, w, imm->x, imm->P, w + M, M, n);
     }
 }
 

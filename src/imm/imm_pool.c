@@ -24,33 +24,13 @@ jl_real jli_log_sum_exp(jl_real *v, int n, jl_real *sum)
     return max + jl_log(*sum);
 }
 
-void jli_pool(jl_real *mean, jl_real *cov, const jl_real *w,
-              const jl_real *x, const jl_real *P, jl_real *d, int M, int n)
-{
-    int i, a, b;
-
-    memset(mean, 0, (size_t)n * sizeof *mean);
-    memset(cov, 0, (size_t)(n * n) * sizeof *cov);
-    for (i = 0; i < M; i++)
-        for (a = 0; a < n; a++)
-            mean[a] += w[i] * x[i * n + a];
-    for (i = 0; i < M; i++) {
-        const jl_real *Pi = P + i * n * n;
-
-        for (a = 0; a < n; a++)
-            d[a] = x[i * n + a] - mean[a];
-        for (a = 0; a < n; a++)
-            for (b = a; b < n; b++)
-                cov[a * n + b] += w[i] * (Pi[a * n + b] + d[a] * d[b]);
-    }
-    for (a = 0; a < n; a++)
-        for (b = 0; b < a; b++)
-            cov[a * n + b] = cov[b * n + a];
-}
-
 void jl_imm_combine(jl_imm *imm)
 {
-    jli_pool(imm->xhat, imm->Phat, imm->mu, imm->x, imm->P, imm->d,
-             imm->M, imm->n);
+    const jl_cov *cov = imm->form->cov;
+
+    cov->pool(imm->xhat, imm->Shat, imm->mu, imm->x, imm->P, imm->d, imm->M,
+              imm->n);
+    if (cov->factored)
+        cov->give(imm->Phat, imm->Shat, imm->n);
     imm->combined = 1;
 }

@@ -5,7 +5,13 @@
 #include "jumplink/imm.h"
 
 /* What may come next: JLI_FAILED ends a step of which a mode has failed. */
-enum { JLI_IDLE = 0, JLI_MIXED = 1, JLI_FILTERED = 2, JLI_FAILED = 3 };
+enum {
+    JLI_IDLE = 0, JLI_MIXED = 1, JLI_FILTERED = 2, JLI_JUDGED = 3,
+    JLI_FAILED = 4
+};
+
+/* The verdict on a measurement. */
+enum { JLI_ACCEPTED = 0, JLI_MISSING = 1, JLI_REJECTED = 2 };
 
 /* Probabilities above this are summed as they are: terms of such a sum that
  * have underflowed are below eps^2 of it.  Sums below it, zero included, are
@@ -14,16 +20,26 @@ enum { JLI_IDLE = 0, JLI_MIXED = 1, JLI_FILTERED = 2, JLI_FAILED = 3 };
 
 #if JL_REAL_FLOAT
 #define jli_log_sum_exp jli_log_sum_exp_f32
-#define jli_pool jli_pool_f32
+#define jli_imm_update jli_imm_update_f32
+#define jli_own_states jli_own_states_f32
+#define jli_all_states jli_all_states_f32
 #endif
 
 /* log sum exp of v [n], any of which may be -infinity; v is overwritten with
  * exp(v - max), *sum is the sum of those. */
 jl_real jli_log_sum_exp(jl_real *v, int n, jl_real *sum);
 
-/* mean = sum_i w_i x_i, cov = sum_i w_i (P_i + (x_i - mean)(x_i - mean)')
- *     mean [n], cov [n,n], w [M], x [M,n], P [M,n,n], d [n] work          */
-void jli_pool(jl_real *mean, jl_real *cov, const jl_real *w,
-              const jl_real *x, const jl_real *P, jl_real *d, int M, int n);
+/* Update mode j in xw, Pw, unless its nis is above the gate (0: none). */
+int jli_imm_update(jl_imm *imm, int j, const jl_real *z, jl_real gate,
+                   jl_real *scratch);
+
+/* --- modes of different states (imm_sizes.c); only where there are maps ---- */
+
+/* What mode j has of the n components of (x, P), into (own_x, own_P); and all n
+ * again, with the prior of those that it lacks.  scratch [n] */
+void jli_own_states(jl_real *own_x, jl_real *own_P, const jl_imm *imm, int j,
+                    const jl_real *x, const jl_real *P, jl_real *scratch);
+void jli_all_states(jl_real *x, jl_real *P, const jl_imm *imm, int j,
+                    const jl_real *own_x, const jl_real *own_P);
 
 #endif

@@ -3,47 +3,94 @@
 
 #include "mat/mat_k.h"
 
+/* Where a mode's own estimate is, and where what becomes of it goes first. */
+struct place {
+    const jl_real *x, *P;       /* [k], [k,k]                               */
+    jl_real *new_x, *new_P;
+    jl_real *rest;              /* scratch                                  */
+};
+
+static struct place own(const jl_imm *imm, int j, jl_real *scratch)
+{
+    int n = imm->n, k = imm->modes[j].n;
+    struct place p;
+
+    p.new_x = scratch;
+    p.new_P = p.new_x + k;
+    p.rest = p.new_P + k * k;
+    p.x = imm->xw + j * n;
+    p.P = imm->Pw + j * n * n;
+    if (imm->map != NULL) {
+        jl_real *x = p.rest, *P = x + k;
+
+        jli_own_states(x, P, imm, j, p.x, p.P, P + k * k);
+        p.x = x;
+        p.P = P;
+        p.rest = P + k * k;
+    }
+    return p;
+}
+
+static void put_back(jl_imm *imm, int j, const struct place *p)
+{
+    int n = imm->n;
+    jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
+
+    if (imm->map != NULL) {
+        jli_all_states(x, P, imm, j, p->new_x, p->new_P);
+    } else {
+        jli_copy(x, p->new_x, n);
+        jli_copy(P, p->new_P, n * n);
+    }
+}
+
 int jl_imm_predict_mode(jl_imm *imm, int j, jl_real *scratch)
 {
-    int n = imm->n, status;
-    jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
-    jl_real *xp = scratch, *Pp = xp + n;
+    struct place p = own(imm, j, scratch);
+    int status;
 
     JL_ASSERT(j >= 0 && j < imm->M);
-    status = imm->form->predict(xp, Pp, &imm->modes[j], x, P, Pp + n * n);
-    if (status == JL_OK) {
-        jli_copy(x, xp, n);
-        jli_copy(P, Pp, n * n);
-    } else {
+    status = imm->form->predict(p.new_x, p.new_P, &imm->modes[j], p.x, p.P,
+                                p.rest);
+    if (status == JL_OK)
+        put_back(imm, j, &p);
+    else
         imm->stage = JLI_FAILED;
-    }
     return status;
+}
+
+int jli_imm_update(jl_imm *imm, int j, const jl_real *z, jl_real gate,
+                   jl_real *scratch)
+{
+    struct place p = own(imm, j, scratch);
+    jl_innovation got;
+    int status;
+
+    got.nu = imm->nu + j * imm->m;
+    status = imm->form->update(p.new_x, p.new_P, &got, &imm->modes[j], p.x,
+                               p.P, z, p.rest);
+    if (status != JL_OK) {
+        imm->stage = JLI_FAILED;
+        return status;
+    }
+    imm->l[j] = got.loglik;
+    imm->nis[j] = got.nis;
+    if (!(gate > 0 && got.nis > gate))
+        put_back(imm, j, &p);
+    return JL_OK;
 }
 
 int jl_imm_update_mode(jl_imm *imm, int j, const jl_real *z,
                        jl_real *scratch)
 {
-    int n = imm->n, status;
-    jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
-    jl_real *xu = scratch, *Pu = xu + n;
-
     JL_ASSERT(j >= 0 && j < imm->M);
     if (imm->stage == JLI_MIXED)
         imm->stage = JLI_FILTERED;
-    imm->missing = z == NULL;
     if (z == NULL) {
         imm->l[j] = 0;
         return JL_OK;
     }
-    status = imm->form->update(xu, Pu, &imm->l[j], &imm->modes[j], x, P, z,
-                               Pu + n * n);
-    if (status == JL_OK) {
-        jli_copy(x, xu, n);
-        jli_copy(P, Pu, n * n);
-    } else {
-        imm->stage = JLI_FAILED;
-    }
-    return status;
+    return jli_imm_update(imm, j, z, imm->gate, scratch);
 }
 
 int jl_imm_filter(jl_imm *imm, const jl_real *z, jl_real *scratch)
@@ -57,7 +104,7 @@ int jl_imm_filter(jl_imm *imm, const jl_real *z, jl_real *scratch)
         if (status == JL_OK)
             status = jl_imm_update_mode(imm, j, z, scratch);
     }
-    return status;
+    return status == JL_OK ? jl_imm_judge(imm, z, scratch) : status;
 }
 
 static void swap(jl_real **a, jl_real **b)
@@ -82,12 +129,28 @@ static jl_real best_likelihood(const jl_imm *imm)
     return best;
 }
 
+static void count(jl_imm *imm)
+{
+    int j;
+
+    if (imm->verdict == JLI_REJECTED) {
+        imm->run++;
+        imm->rejected++;
+    } else if (imm->verdict == JLI_ACCEPTED) {
+        imm->run = 0;
+        imm->accepted++;
+        for (j = 0; j < imm->M; j++)
+            imm->nis_mean[j] += (imm->nis[j] - imm->nis_mean[j])
+                / (jl_real)imm->accepted;
+    }
+}
+
 int jl_imm_weigh(jl_imm *imm)
 {
     int j, M = imm->M;
     jl_real *e = imm->e, best, sum, lse;
 
-    if (imm->stage != JLI_FILTERED)
+    if (imm->stage != JLI_JUDGED)
         return JL_EORDER;
     best = best_likelihood(imm);
     for (j = 0; j < M; j++) {
@@ -99,7 +162,8 @@ int jl_imm_weigh(jl_imm *imm)
         imm->logmu[j] -= lse;
         imm->mu[j] = e[j] / sum;
     }
-    imm->loglik = imm->missing ? 0 : best + lse;
+    imm->loglik = imm->verdict == JLI_ACCEPTED ? best + lse : 0;
+    count(imm);
     swap(&imm->x, &imm->xw);
     swap(&imm->P, &imm->Pw);
     imm->stage = JLI_IDLE;

@@ -19,9 +19,30 @@ int jl_mode_init(jl_mode *mode, int n, int m, int p, jl_real *mem, int cap)
     mode->u = mode->W + n * n;
     mode->H = mode->u + n;
     mode->R = mode->H + m * n;
-    mode->G = mode->R + m * m;
-    mode->Q = mode->G + n * p;
+    mode->V = mode->R + m * m;
+    mode->N = mode->V + m * m;
+    mode->q = mode->N + p * n;
+    mode->nonlinear = NULL;
+    mode->move = NULL;
+    mode->sense = NULL;
     return JL_OK;
+}
+
+/* With Q = U' D U, G Q G' is the sum of D_k times the square of row k of U G'. */
+static void set_noises(jl_mode *mode, const jl_real *G, const jl_real *UD)
+{
+    int n = mode->n, p = mode->p, k, i, a;
+
+    for (k = 0; k < p; k++) {
+        mode->q[k] = UD[k * p + k];
+        for (i = 0; i < n; i++) {
+            jl_real s = G[i * p + k];
+
+            for (a = k + 1; a < p; a++)
+                s += UD[k * p + a] * G[i * p + a];
+            mode->N[k * n + i] = s;
+        }
+    }
 }
 
 int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
@@ -29,7 +50,8 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
                 const jl_real *R, jl_real *scratch)
 {
     int n = mode->n, m = mode->m, p = mode->p, status;
-    jl_real *W = scratch, *GQ = W + n * n, *L = GQ + n * p, *work = L + m * m;
+    jl_real *W = scratch, *GQ = W + n * n, *L = GQ + n * (p + 1);
+    jl_real *work = L + m * m;
 
     if (!jl_vec_within(F, n * n, JL_LARGE) || !jl_vec_within(G, n * p, JL_LARGE)
         || !jl_vec_within(H, m * n, JL_LARGE)
@@ -58,9 +80,10 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
     jli_copy(mode->W, W, n * n);
     jli_copy(mode->F, F, n * n);
     jli_copy(mode->H, H, m * n);
-    jli_copy(mode->G, G, n * p);
-    jli_copy(mode->Q, Q, p * p);
     jl_mat_pack(L, R, m);               /* exactly symmetric from here on */
     jl_mat_unpack(mode->R, L, m);
+    jl_mat_ud(mode->V, mode->R, work, m);
+    jl_mat_ud(work, Q, work + p * p, p);
+    set_noises(mode, G, work);
     return JL_OK;
 }

@@ -116,9 +116,10 @@ int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt)
             straight(mode->F, n, at, motion->kind, dt);
         mode->H[a * n + at] = 1;
         mode->R[a * axes + a] = motion->sigma_z * motion->sigma_z;
-        mode->Q[a * axes + a] = q;
+        mode->V[a * axes + a] = mode->R[a * axes + a];
+        mode->q[a] = q;
         for (i = 0; i < order; i++) {
-            mode->G[(at + i) * axes + a] = g[i];
+            mode->N[a * n + at + i] = g[i];
             for (j = 0; j < order; j++)
                 mode->W[(at + i) * n + at + j] = g[i] * q * g[j];
         }

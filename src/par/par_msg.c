@@ -84,7 +84,8 @@ static int count_estimates(const jl_par *par, const jl_hop *hop)
         : count_modes(par, hop);
 }
 
-/* The lower half of a full covariance is not sent: it mirrors the upper. */
+/* The lower half of a covariance is not sent: it mirrors the upper, or, of a
+ * factor, is zero. */
 static unsigned char *put_upper(unsigned char *p, const jl_real *P, int n)
 {
     int i;
@@ -95,16 +96,33 @@ static unsigned char *put_upper(unsigned char *p, const jl_real *P, int n)
 }
 
 static const unsigned char *get_upper(const unsigned char *p, jl_real *P,
-                                      int n)
+                                      int factored, int n)
 {
     int i, j;
 
     for (i = 0; i < n; i++) {
         p = jl_get_reals(p, P + i * n + i, n - i);
         for (j = i + 1; j < n; j++)
-            P[j * n + i] = P[i * n + j];
+            P[j * n + i] = factored ? 0 : P[i * n + j];
     }
     return p;
+}
+
+/* A mode whose nis is above the gate says so in its status. */
+#define OUTSIDE 0x8000u
+
+static unsigned status_word(const jl_par *par, int j)
+{
+    const jl_imm *imm = par->imm;
+    unsigned word = (unsigned)-par->status[j];
+
+    return imm->gate > 0 && imm->nis[j] > imm->gate ? word | OUTSIDE : word;
+}
+
+static void read_status(jl_par *par, int j, unsigned word)
+{
+    par->status[j] = -(int)(word & ~OUTSIDE);
+    par->imm->nis[j] = word & OUTSIDE ? JL_REAL_MAX : 0;
 }
 
 /* The own pool has a place of its own, for the own modes are still needed. */
@@ -133,7 +151,7 @@ int jli_msg_modes(unsigned char *buf, const jl_par *par, const jl_hop *hop)
                        par->seq);
     for (j = 0; j < imm->M; j++)
         if (carried(par, hop, j)) {
-            jl_put_u16(p, (unsigned)-par->status[j]);
+            jl_put_u16(p, status_word(par, j));
             p += 2;
         }
     for (j = 0; j < imm->M; j++)
@@ -164,7 +182,7 @@ int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
     buf += JLI_MSG_HEADER;
     for (j = 0; j < imm->M; j++)
         if (carried(par, hop, j)) {
-            par->status[j] = -(int)jl_get_u16(buf);
+            read_status(par, j, jl_get_u16(buf));
             buf += 2;
         }
     for (j = 0; j < imm->M; j++)
@@ -173,7 +191,8 @@ int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
     for (j = 0; j < imm->M; j++)
         if (carried(par, hop, j) && has_estimate(par, j)) {
             buf = jl_get_reals(buf, imm->xw + j * n, n);
-            buf = get_upper(buf, imm->Pw + j * n * n, n);
+            buf = get_upper(buf, imm->Pw + j * n * n,
+                            imm->form->cov->factored, n);
         }
     return JL_OK;
 }
@@ -212,7 +231,7 @@ int jli_msg_estimate_read(jl_estimate *estimate, int M, int n,
     if (status == JL_OK) {
         buf = jl_get_reals(buf + JLI_MSG_HEADER, &estimate->loglik, 1);
         buf = jl_get_reals(buf, estimate->x, n);
-        buf = get_upper(buf, estimate->P, n);
+        buf = get_upper(buf, estimate->P, 0, n);
         (void)jl_get_reals(buf, estimate->mu, M);
     }
     return JL_OK;

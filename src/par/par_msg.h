@@ -16,7 +16,9 @@
  * What is marked - is 0.  READY bears the PE that its numbers are of: a PE
  * passes on those that differ from its own.  MODES lists, in index order, the
  * modes of the PEs whose blocks the hop carries; (x, P) follow of each mode, or,
- * in an all-reduce, the pool of each PE, at the place of its first mode.  FAULT
+ * in an all-reduce, the pool of each PE, at the place of its first mode; P as
+ * the form keeps it, covariance or factor.  Bit 15 of a status says that the
+ * measurement is outside the mode's gate, and (x, P) predicted only.  FAULT
  * names the PE (npe: the host) that cannot be gone on with.
  */
 #ifndef JL_PAR_MSG_H

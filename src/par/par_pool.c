@@ -4,29 +4,18 @@
 #include "imm/imm_stage.h"
 #include "mat/mat_k.h"
 
-/* Into (x, P) of weight *sum, another (xj, Pj) of weight w: with a = sum / (sum
- * + w), b = w / (sum + w), d = xj - x
- *     x += b d,  P = a P + b Pj + a b d d'
- * Centred: no difference of second moments is ever formed. */
-static void merge(jl_real *x, jl_real *P, jl_real *sum, const jl_real *xj,
-                  const jl_real *Pj, jl_real w, int n)
+/* Into (x, P) of weight *sum, another (xj, Pj) of weight w.  Centred: no
+ * difference of second moments is ever formed.  imm->d is work. */
+static void merge(const jl_imm *imm, jl_real *x, jl_real *P, jl_real *sum,
+                  const jl_real *xj, const jl_real *Pj, jl_real w)
 {
-    jl_real a, b;
-    int r, s;
+    jl_real all = *sum + w;
 
     if (!(w > 0))
         return;
-    a = *sum / (*sum + w);
-    b = w / (*sum + w);
-    for (r = 0; r < n; r++)
-        for (s = r; s < n; s++) {
-            P[r * n + s] = a * P[r * n + s] + b * Pj[r * n + s]
-                + a * b * ((xj[r] - x[r]) * (xj[s] - x[s]));
-            P[s * n + r] = P[r * n + s];
-        }
-    for (r = 0; r < n; r++)
-        x[r] += b * (xj[r] - x[r]);
-    *sum += w;
+    imm->form->cov->blend(x, P, *sum / all, x, P, w / all, xj, Pj, imm->d,
+                          imm->n);
+    *sum = all;
 }
 
 static int first_mode(const jl_par *par, int pe)
@@ -60,8 +49,8 @@ void jli_pool_own(jl_par *par)
     memset(x, 0, (size_t)(n + n * n) * sizeof *x);
     for (j = 0; j < imm->M; j++)
         if (is_own(par, j))
-            merge(x, P, &sum, imm->xw + j * n, imm->Pw + j * n * n, imm->e[j],
-                  n);
+            merge(imm, x, P, &sum, imm->xw + j * n, imm->Pw + j * n * n,
+                  imm->e[j]);
 }
 
 void jli_pool_merge(jl_par *par)
@@ -71,7 +60,7 @@ void jli_pool_merge(jl_par *par)
     jl_real sum = 0;
 
     memset(imm->xhat, 0, (size_t)n * sizeof *imm->xhat);
-    memset(imm->Phat, 0, (size_t)(n * n) * sizeof *imm->Phat);
+    memset(imm->Shat, 0, (size_t)(n * n) * sizeof *imm->Shat);
     for (pe = 0; pe < par->active; pe++) {
         const jl_real *x = par->pool, *P = x + n;
         jl_real w = 0;
@@ -83,7 +72,9 @@ void jli_pool_merge(jl_par *par)
         for (j = 0; j < imm->M; j++)
             if (par->config.owner[j] == pe)
                 w += imm->mu[j];
-        merge(imm->xhat, imm->Phat, &sum, x, P, w, n);
+        merge(imm, imm->xhat, imm->Shat, &sum, x, P, w);
     }
+    if (imm->form->cov->factored)
+        imm->form->cov->give(imm->Phat, imm->Shat, n);
     imm->combined = 1;
 }

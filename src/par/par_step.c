@@ -61,6 +61,8 @@ int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch)
     }
     if (reduces && !imm->sticky)
         return JL_ECHAIN;
+    if (reduces && imm->gate > 0)
+        return JL_EGATE;
     if (!par->ahead || imm->stage != JLI_MIXED)
         go_ahead(par, scratch);
     par->ahead = 0;
@@ -73,6 +75,8 @@ int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch)
     if (status != JL_OK)
         return status;
     status = first_failure(par);
+    if (status == JL_OK)
+        status = jl_imm_judge(imm, meas->z, scratch);
     if (status == JL_OK)
         status = jl_imm_weigh(imm);
     if (status == JL_OK && reduces)

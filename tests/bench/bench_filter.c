@@ -54,7 +54,7 @@ static struct bank *bank_new(int M, enum bench_kind kind)
     bench_must(bank != NULL, "memory");
     bank->cap = JL_PAR_BUF(M, N, AXES);
     bank->modes = calloc((size_t)M, sizeof *bank->modes);
-    bank->mem = calloc((size_t)(M * size + JL_IMM_STATE(M, N)
+    bank->mem = calloc((size_t)(M * size + JL_IMM_STATE(M, N, AXES)
                                 + JL_IMM_SCRATCH(M, N, AXES)
                                 + M * N + M * N * N + M), sizeof *p);
     bank->buf = malloc((size_t)bank->cap);
@@ -80,7 +80,7 @@ static struct bank *bank_new(int M, enum bench_kind kind)
         bank->mu[j] = 1 / (jl_real)M;
     }
     bench_must(jl_imm_init(&bank->imm, M, bank->modes, &jl_kf_joseph,
-                           JL_MIX_AUTO, state, JL_IMM_STATE(M, N)) == JL_OK,
+                           JL_MIX_AUTO, state, JL_IMM_STATE(M, N, AXES)) == JL_OK,
                "the filter");
     set_chain(bank, M, kind);
     bench_must(jl_imm_set(&bank->imm, bank->x, bank->P, bank->mu,

@@ -22,7 +22,7 @@ static void set_up(int j)
 }
 
 #ifdef FIRMWARE_IMM
-static jl_real mem[JL_IMM_STATE(M, N)], scratch[JL_IMM_SCRATCH(M, N, Z)];
+static jl_real mem[JL_IMM_STATE(M, N, Z)], scratch[JL_IMM_SCRATCH(M, N, Z)];
 
 int main(void)
 {
@@ -34,20 +34,20 @@ int main(void)
     set_up(0);
     set_up(1);
     (void)jl_imm_init(&imm, M, modes, &jl_kf_joseph, JL_MIX_AUTO, mem,
-                      JL_IMM_STATE(M, N));
+                      JL_IMM_STATE(M, N, Z));
     (void)jl_imm_chain(&imm, Pi);
     (void)jl_imm_set(&imm, x, P, mu, scratch);
     return jl_imm_step(&imm, z, scratch);
 }
 #else
-static jl_real mem[JL_KF_STATE(N)], scratch[JL_KF_SCRATCH(N, Z)];
+static jl_real mem[JL_KF_STATE(N, Z)], scratch[JL_KF_SCRATCH(N, Z)];
 
 int main(void)
 {
     static jl_kf kf;
 
     set_up(0);
-    (void)jl_kf_init(&kf, &modes[0], &jl_kf_joseph, mem, JL_KF_STATE(N));
+    (void)jl_kf_init(&kf, &modes[0], &jl_kf_joseph, mem, JL_KF_STATE(N, Z));
     (void)jl_kf_set(&kf, x, P, scratch);
     return jl_kf_step(&kf, NULL, z, scratch);
 }

@@ -31,7 +31,7 @@ struct par_shape {
 struct par_bank {
     jl_mode modes[PAR_MOST];
     jl_real mode_mem[PAR_MOST][JL_MODE_MEM(PAR_N, PAR_Z, PAR_Z)];
-    jl_real mem[JL_IMM_STATE(PAR_MOST, PAR_N)];
+    jl_real mem[JL_IMM_STATE(PAR_MOST, PAR_N, PAR_N)];
     jl_real scratch[JL_IMM_SCRATCH(PAR_MOST, PAR_N, PAR_Z)];
     jl_real Pi[PAR_MOST * PAR_MOST];
     jl_motion motions[PAR_MOST];
@@ -83,7 +83,7 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
     }
     assert_int_equal(jl_imm_init(&bank->imm, M, bank->modes, form,
                                  JL_MIX_AUTO, bank->mem,
-                                 JL_IMM_STATE(PAR_MOST, PAR_N)), 0);
+                                 JL_IMM_STATE(PAR_MOST, PAR_N, PAR_N)), 0);
     assert_int_equal(jl_imm_chain(&bank->imm, bank->Pi), 0);
     assert_int_equal(bank->imm.sticky, sticky || M <= 2);
     assert_int_equal(jl_imm_set(&bank->imm, x, P, mu, bank->scratch), 0);

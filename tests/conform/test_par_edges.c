@@ -63,8 +63,8 @@ static void test_par_deadlines_grow_and_stay_numbers(void **state)
 static void test_pool_heeds_only_modes_that_are_possible(void **state)
 {
     static const unsigned char owner[MODES] = { 0, 0, 0 };
-    static jl_real mem[JL_IMM_STATE(MODES, 1)];
-    jl_real pool[2];
+    static jl_real mem[JL_IMM_STATE(MODES, 1, 1)];
+    jl_real pool[2], work[2];
     jl_imm imm;
     jl_par par;
 
@@ -73,6 +73,8 @@ static void test_pool_heeds_only_modes_that_are_possible(void **state)
     memset(&par, 0, sizeof par);
     imm.M = MODES;
     imm.n = 1;
+    imm.form = &jl_kf_joseph;
+    imm.d = work;
     imm.xw = mem;
     imm.Pw = mem + MODES;
     imm.l = mem + 2 * MODES;

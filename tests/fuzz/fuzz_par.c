@@ -23,7 +23,7 @@ enum { ESTIMATE = 8 + (1 + N + JL_PACKED(N) + M) * JL_REAL_OCTETS };
 struct bank {
     jl_mode modes[M];
     jl_real mode_mem[M][JL_MODE_MEM(N, Z, Z)];
-    jl_real mem[JL_IMM_STATE(M, N)];
+    jl_real mem[JL_IMM_STATE(M, N, N)];
     jl_real scratch[JL_IMM_SCRATCH(M, N, Z)];
     jl_imm imm;
 };
@@ -179,7 +179,7 @@ static void bank_init(struct bank *bank, int sticky)
         jl_motion_start(x + j * N, P + j * N * N, &motion, &zero, 10, 3);
     }
     FUZZ_HOLDS(jl_imm_init(&bank->imm, M, bank->modes, &jl_kf_joseph,
-                           JL_MIX_AUTO, bank->mem, JL_IMM_STATE(M, N)) ==
+                           JL_MIX_AUTO, bank->mem, JL_IMM_STATE(M, N, N)) ==
                JL_OK);
     FUZZ_HOLDS(jl_imm_chain(&bank->imm, sticky ? alike : other) == JL_OK);
     FUZZ_HOLDS(jl_imm_set(&bank->imm, x, P, mu, bank->scratch) == JL_OK);

@@ -103,7 +103,7 @@ static void run(const struct imm_case *c, const jl_kf_form *form, int mixing,
                 const struct tolerance *t)
 {
     static jl_real mode_mem[MODES][JL_MODE_MEM(N, N, N)];
-    static jl_real mem[JL_IMM_STATE(MODES, N)];
+    static jl_real mem[JL_IMM_STATE(MODES, N, N)];
     static jl_real scratch[JL_IMM_SCRATCH(MODES, N, N)];
     static jl_real big[3][MODES * N * N], row[7][N * N];
     static double sigma[ROWS * N];
@@ -126,7 +126,7 @@ static void run(const struct imm_case *c, const jl_kf_form *form, int mixing,
             JL_OK);
     }
     assert_int_equal(jl_imm_init(&imm, M, modes, form, mixing, mem,
-                                 JL_IMM_STATE(MODES, N)), JL_OK);
+                                 JL_IMM_STATE(MODES, N, N)), JL_OK);
     assert_int_equal(jl_imm_chain(&imm, real(big[0], c->Pi, M * M)), JL_OK);
     assert_int_equal(jl_imm_set(&imm, real(big[0], c->x0, M * n),
                                 real(big[1], c->P0, M * n * n),

@@ -624,14 +624,14 @@ static void test_status_texts_are_there_and_distinct(void **state)
     int a, b;
 
     (void)state;
-    for (a = JL_ECHAIN; a <= JL_OK; a++) {
+    for (a = JL_EGATE; a <= JL_OK; a++) {
         const char *text = jl_status_text(a);
 
         assert_non_null(text);
         assert_in_range(strlen(text), 5, 70);
         assert_null(strchr(text, '\n'));
         assert_string_not_equal(text, "unknown status");
-        for (b = JL_ECHAIN; b < a; b++)
+        for (b = JL_EGATE; b < a; b++)
             assert_string_not_equal(text, jl_status_text(b));
     }
     assert_string_equal(jl_status_text(JL_ESINGULAR),
@@ -640,7 +640,7 @@ static void test_status_texts_are_there_and_distinct(void **state)
 
 static void test_status_unknown_codes_have_a_text(void **state)
 {
-    const int unknown[] = {1, 7, JL_ECHAIN - 1, -100, INT_MAX, INT_MIN};
+    const int unknown[] = {1, 7, JL_EGATE - 1, -100, INT_MAX, INT_MIN};
     size_t i;
 
     (void)state;

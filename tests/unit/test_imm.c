@@ -29,7 +29,7 @@ static jl_real rnd(void)
 /* --- a filter with its modes, memory and scratch ------------------------ */
 
 #define MODE_MEM JL_MODE_MEM(N_MAX, Z_MAX, 1)
-#define MEM (JL_IMM_STATE(M_MAX, N_MAX) + 2 * EDGE)
+#define MEM (JL_IMM_STATE(M_MAX, N_MAX, N_MAX) + 2 * EDGE)
 
 struct rig {
     jl_mode modes[M_MAX];
@@ -77,7 +77,7 @@ static void check_edges(const struct rig *r)
 
     for (i = 0; i < EDGE; i++) {
         assert_true(isnan(r->mem[i]));
-        assert_true(isnan(r->mem[EDGE + JL_IMM_STATE(in.M, in.n) + i]));
+        assert_true(isnan(r->mem[EDGE + JL_IMM_STATE(in.M, in.n, in.m) + i]));
         assert_true(isnan(scratch[i]));
         assert_true(isnan(scratch[EDGE + JL_IMM_SCRATCH(in.M, in.n, in.m)
                                   + i]));
@@ -197,7 +197,7 @@ static void bind(struct rig *r, const jl_kf_form *form, int mixing)
         set_mode(r, j);
     }
     assert_int_equal(jl_imm_init(&r->imm, in.M, r->modes, form, mixing,
-                                 r->mem + EDGE, JL_IMM_STATE(in.M, in.n)),
+                                 r->mem + EDGE, JL_IMM_STATE(in.M, in.n, in.m)),
                      JL_OK);
     assert_int_equal(jl_imm_chain(&r->imm, in.Pi), JL_OK);
     assert_int_equal(jl_imm_set(&r->imm, in.x, in.P, in.mu, spoilt()), JL_OK);
@@ -430,8 +430,8 @@ static void test_imm_init_refuses(void **state)
     assert_int_equal(init_status(JL_MAX_MODES + 1, 0, INT_MAX), JL_EDIM);
     assert_int_equal(init_status(3, 2, MEM), JL_EDIM);
     assert_int_equal(init_status(3, -1, MEM), JL_EDIM);
-    assert_int_equal(init_status(3, 0, JL_IMM_STATE(3, 2) - 1), JL_ENOMEM);
-    assert_int_equal(init_status(1, 0, JL_IMM_STATE(1, 2) - 1), JL_ENOMEM);
+    assert_int_equal(init_status(3, 0, JL_IMM_STATE(3, 2, 1) - 1), JL_ENOMEM);
+    assert_int_equal(init_status(1, 0, JL_IMM_STATE(1, 2, 1) - 1), JL_ENOMEM);
     assert_int_equal(init_status(3, 0, 0), JL_ENOMEM);
     assert_int_equal(init_status(3, 0, -1), JL_ENOMEM);
     keep = rig.modes[2];
@@ -443,7 +443,7 @@ static void test_imm_init_refuses(void **state)
     rig.modes[2] = keep;
     rig.modes[2].p = 2;                 /* noises may differ */
     assert_int_equal(jl_imm_init(&rig.imm, 3, rig.modes, &jl_kf_joseph, 0,
-                                 rig.mem + EDGE, JL_IMM_STATE(3, 2)), JL_OK);
+                                 rig.mem + EDGE, JL_IMM_STATE(3, 2, 1)), JL_OK);
 }
 
 static void test_imm_init_state(void **state)
@@ -456,7 +456,7 @@ static void test_imm_init_state(void **state)
     bind(&rig, &jl_kf_joseph, JL_MIX_AUTO);
     assert_int_equal(jl_imm_init(a, 3, rig.modes, &jl_kf_standard,
                                  JL_MIX_GENERAL, rig.mem + EDGE,
-                                 JL_IMM_STATE(3, 2)), JL_OK);
+                                 JL_IMM_STATE(3, 2, 1)), JL_OK);
     check_edges(&rig);
     assert_true(a->M == 3 && a->n == 2 && a->m == 1);
     assert_ptr_equal(a->modes, rig.modes);
@@ -494,7 +494,7 @@ static void test_imm_init_chain(void **state)
         bind(&twin, &jl_kf_joseph, mixing);
         bind(&rig, &jl_kf_joseph, mixing);
         jl_imm_init(&rig.imm, 3, rig.modes, &jl_kf_joseph, mixing,
-                    rig.mem + EDGE, JL_IMM_STATE(3, 2));
+                    rig.mem + EDGE, JL_IMM_STATE(3, 2, 1));
         jl_imm_set(&rig.imm, in.x, in.P, in.mu, spoilt());
         assert_int_equal(rig.imm.sticky, twin.imm.sticky);
         assert_int_equal(step(&rig, z), JL_OK);
@@ -509,7 +509,7 @@ static void test_imm_most_modes(void **state)
     enum { MOST = JL_MAX_MODES };
     static jl_mode modes[MOST];
     static jl_real mode_mem[MOST][JL_MODE_MEM(1, 1, 1)];
-    static jl_real mem[2][JL_IMM_STATE(MOST, 1)], mu[MOST], Pi[MOST * MOST];
+    static jl_real mem[2][JL_IMM_STATE(MOST, 1, 1)], mu[MOST], Pi[MOST * MOST];
     static jl_real work[JL_IMM_SCRATCH(MOST, 1, 1)], ones[MOST], zeros[MOST];
     const jl_real one = 1, half = JL_C(0.5), z = JL_C(0.25);
     jl_real rate, sum = 0;
@@ -529,7 +529,7 @@ static void test_imm_most_modes(void **state)
     for (i = 0; i < 2; i++) {
         assert_int_equal(jl_imm_init(&imm[i], MOST, modes, &jl_kf_joseph,
                                      i == 0 ? JL_MIX_AUTO : JL_MIX_GENERAL,
-                                     mem[i], JL_IMM_STATE(MOST, 1)), JL_OK);
+                                     mem[i], JL_IMM_STATE(MOST, 1, 1)), JL_OK);
         assert_int_equal(jl_imm_chain(&imm[i], Pi), JL_OK);
         assert_int_equal(jl_imm_set(&imm[i], zeros, ones, mu, work), JL_OK);
         for (j = 0; j < 3; j++)
@@ -879,12 +879,12 @@ static void test_imm_modes_in_another_order(void **state)
 
 /* --- against Kalman filters --------------------------------------------- */
 
-static jl_real kf_mem[2][JL_KF_STATE(N_MAX)];
+static jl_real kf_mem[2][JL_KF_STATE(N_MAX, N_MAX)];
 
 static void make_kf(jl_kf *kf, int j, int slot)
 {
     jl_kf_init(kf, &rig.modes[j], rig.imm.form, kf_mem[slot],
-               JL_KF_STATE(in.n));
+               JL_KF_STATE(in.n, in.m));
     jl_kf_set(kf, in.x + j * in.n, in.P + j * in.n * in.n, scratch);
 }
 
@@ -1277,6 +1277,7 @@ static void check_routes(int f, int mixing, int sticky)
         for (j = 5; j-- > 0;)
             assert_int_equal(jl_imm_update_mode(&parts.imm, j, given,
                                                 littered()), JL_OK);
+        assert_int_equal(jl_imm_judge(&parts.imm, given, littered()), JL_OK);
         assert_int_equal(jl_imm_weigh(&parts.imm), JL_OK);
         jl_imm_combine(&parts.imm);
         /* pieces on two processors */
@@ -1294,6 +1295,8 @@ static void check_routes(int f, int mixing, int sticky)
             memcpy(guest->imm.Pw + j * 9, owner->imm.Pw + j * 9,
                    9 * sizeof(jl_real));
         }
+        assert_int_equal(jl_imm_judge(&left.imm, given, spoilt()), JL_OK);
+        assert_int_equal(jl_imm_judge(&right.imm, given, spoilt()), JL_OK);
         assert_int_equal(jl_imm_weigh(&left.imm), JL_OK);
         assert_int_equal(jl_imm_weigh(&right.imm), JL_OK);
         jl_imm_combine(&left.imm);

@@ -30,7 +30,7 @@ struct rig {
     jl_kf kf;
     jl_real loglik;
     jl_real mode_mem[JL_MODE_MEM(MAX, MAX, MAX)];
-    jl_real mem[JL_KF_STATE(MAX) + 2 * EDGE];
+    jl_real mem[JL_KF_STATE(MAX, MAX) + 2 * EDGE];
 };
 
 static struct rig rig, twin, before;
@@ -53,7 +53,7 @@ static void check_edges(const struct rig *r)
 
     for (i = 0; i < EDGE; i++) {
         assert_true(isnan(r->mem[i]));
-        assert_true(isnan(r->mem[EDGE + JL_KF_STATE(r->mode.n) + i]));
+        assert_true(isnan(r->mem[EDGE + JL_KF_STATE(r->mode.n, r->mode.m) + i]));
         assert_true(isnan(scratch[i]));
         assert_true(isnan(scratch[EDGE + JL_KF_SCRATCH(r->mode.n, r->mode.m)
                                   + i]));
@@ -93,10 +93,10 @@ static void make(struct rig *r, const jl_kf_form *form, int n, int m)
     jl_mode_init(&r->mode, n, m, 1, r->mode_mem, JL_MODE_MEM(n, m, 1));
     assert_int_equal(jl_mode_set(&r->mode, F, G, &q, &w_bar, H, R, scratch),
                      JL_OK);
-    for (i = 0; i < JL_KF_STATE(n) + 2 * EDGE; i++)
+    for (i = 0; i < JL_KF_STATE(n, rig.mode.m) + 2 * EDGE; i++)
         r->mem[i] = NAN_;
     assert_int_equal(jl_kf_init(&r->kf, &r->mode, form, r->mem + EDGE,
-                                JL_KF_STATE(n)), JL_OK);
+                                JL_KF_STATE(n, rig.mode.m)), JL_OK);
     for (i = 0; i < n; i++)
         G[i] = rnd();
     make_cov(F, n, JL_C(0.1));
@@ -124,7 +124,7 @@ static void make_twin(void)
 
     memcpy(&twin, &rig, sizeof rig);
     jl_kf_init(&twin.kf, &rig.mode, rig.kf.form, twin.mem + EDGE,
-               JL_KF_STATE(n));
+               JL_KF_STATE(n, rig.mode.m));
     memcpy(twin.kf.x, rig.kf.x, (size_t)n * sizeof(jl_real));
     memcpy(twin.kf.P, rig.kf.P, (size_t)(n * n) * sizeof(jl_real));
 }
@@ -276,10 +276,10 @@ static void test_kf_init(void **state)
         assert_int_equal(jl_kf_init(&rig.kf, &twin.mode, &jl_kf_standard,
                                     rig.mem, -1), JL_ENOMEM);
         assert_int_equal(jl_kf_init(&rig.kf, &rig.mode, &jl_kf_standard,
-                                    rig.mem, JL_KF_STATE(n) - 1), JL_ENOMEM);
+                                    rig.mem, JL_KF_STATE(n, rig.mode.m) - 1), JL_ENOMEM);
         assert_same_bits(&rig, &before, sizeof rig);
         assert_int_equal(jl_kf_init(&rig.kf, &rig.mode, &jl_kf_standard,
-                                    rig.mem + EDGE, JL_KF_STATE(n)), JL_OK);
+                                    rig.mem + EDGE, JL_KF_STATE(n, rig.mode.m)), JL_OK);
         check_edges(&rig);
         assert_ptr_equal(rig.kf.mode, &rig.mode);
         assert_ptr_equal(rig.kf.form, &jl_kf_standard);
@@ -454,10 +454,12 @@ static void test_kf_joseph_keeps_what_is_small(void **state)
 
 static void test_kf_step_is_predict_and_update(void **state)
 {
-    jl_real z[3], out[JL_KF_STATE(4)], pred[JL_KF_STATE(4)], loglik;
+    jl_real z[3], out[JL_KF_STATE(4, 3)], pred[JL_KF_STATE(4, 3)], nu[3];
+    jl_innovation got;
     int f, k, i;
 
     (void)state;
+    got.nu = nu;
     for (f = 0; f < 2; f++) {
         make(&rig, forms[f], 4, 3);
         make_twin();
@@ -471,7 +473,7 @@ static void test_kf_step_is_predict_and_update(void **state)
             assert_int_equal(forms[f]->predict(pred, pred + 4, &rig.mode,
                                                twin.kf.x, twin.kf.P,
                                                spoilt(&rig)), JL_OK);
-            assert_int_equal(forms[f]->update(out, out + 4, &loglik,
+            assert_int_equal(forms[f]->update(out, out + 4, &got,
                                               &rig.mode, pred, pred + 4, z,
                                               spoilt(&rig)), JL_OK);
             check_edges(&rig);
@@ -486,7 +488,7 @@ static void test_kf_step_is_predict_and_update(void **state)
             if (given != NULL) {
                 assert_same_bits(rig.kf.x, out, 4 * sizeof *out);
                 assert_same_bits(rig.kf.P, out + 4, 16 * sizeof *out);
-                assert_same_bits(&rig.loglik, &loglik, sizeof loglik);
+                assert_same_bits(&rig.loglik, &got.loglik, sizeof z[0]);
             }
         }
     }
@@ -609,14 +611,16 @@ static void test_kf_refuses_z_beyond_large(void **state)
 static void test_kf_form_fails_alone(void **state)
 {
     const jl_real z[2] = { NAN_, 1 };
-    jl_real out[JL_KF_STATE(3)], loglik;
+    jl_real out[JL_KF_STATE(3, 3)], nu[2];
+    jl_innovation got;
     int f;
 
     (void)state;
+    got.nu = nu;
     for (f = 0; f < 2; f++) {
         make(&rig, forms[f], 3, 2);
         memcpy(&before, &rig, sizeof rig);
-        assert_int_equal(forms[f]->update(out, out + 3, &loglik, &rig.mode,
+        assert_int_equal(forms[f]->update(out, out + 3, &got, &rig.mode,
                                           rig.kf.x, rig.kf.P, z,
                                           spoilt(&rig)), JL_ENONFINITE);
         check_edges(&rig);

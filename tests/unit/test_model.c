@@ -63,8 +63,9 @@ static void check_same(const jl_mode *a, const jl_mode *b)
     assert_same_bits(a->u, b->u, n * sizeof(jl_real));
     assert_same_bits(a->H, b->H, m * n * sizeof(jl_real));
     assert_same_bits(a->R, b->R, m * m * sizeof(jl_real));
-    assert_same_bits(a->G, b->G, n * p * sizeof(jl_real));
-    assert_same_bits(a->Q, b->Q, p * p * sizeof(jl_real));
+    assert_same_bits(a->V, b->V, m * m * sizeof(jl_real));
+    assert_same_bits(a->N, b->N, n * p * sizeof(jl_real));
+    assert_same_bits(a->q, b->q, p * sizeof(jl_real));
 }
 
 /* --- init --------------------------------------------------------------- */
@@ -117,9 +118,10 @@ static void check_layout(int n, int m, int p)
     number(a->u, n, &next);
     number(a->H, m * n, &next);
     number(a->R, m * m, &next);
-    number(a->G, n * p, &next);
-    number(a->Q, p * p, &next);
-    assert_true(a->F[0] == 1 && a->Q[p * p - 1] == (jl_real)(next - 1));
+    number(a->V, m * m, &next);
+    number(a->N, n * p, &next);
+    number(a->q, p, &next);
+    assert_true(a->F[0] == 1 && a->q[p - 1] == (jl_real)(next - 1));
     for (i = 0; i < JL_MODE_MEM(n, m, p); i++)
         seen += rig.mem[EDGE + i] > 0;
     assert_int_equal(seen, next - 1);   /* none overlaps another */
@@ -200,8 +202,6 @@ static void check_set(int n, int m, int p)
     make_input(m, p);
     assert_int_equal(set(1), JL_OK);
     assert_same_bits(a->F, in.F, (size_t)(n * n) * sizeof *in.F);
-    assert_same_bits(a->G, in.G, (size_t)(n * p) * sizeof *in.G);
-    assert_same_bits(a->Q, in.Q, (size_t)(p * p) * sizeof *in.Q);
     assert_same_bits(a->H, in.H, (size_t)(m * n) * sizeof *in.H);
     assert_same_bits(a->R, in.R, (size_t)(m * m) * sizeof *in.R);
     for (i = 0; i < n; i++) {
@@ -216,8 +216,21 @@ static void check_set(int n, int m, int p)
             assert_close(a->W[i * n + j], want, tolerance);
             assert_same_bits(&a->W[i * n + j], &a->W[j * n + i],
                              sizeof *a->W);
+            for (k = 0; k < p; k++)     /* the same of the factors */
+                want -= (long double)a->q[k] * a->N[k * n + i]
+                    * a->N[k * n + j];
+            assert_close(want, 0, 4 * tolerance);
         }
     }
+    for (i = 0; i < m; i++)
+        for (j = 0; j < m; j++) {
+            want = in.R[i * m + j];
+            for (k = 0; k <= i && k <= j; k++)
+                want -= (long double)a->V[k * m + k]
+                    * (k == i ? 1 : a->V[k * m + i])
+                    * (k == j ? 1 : a->V[k * m + j]);
+            assert_close(want, 0, 32.0 * m * EPS);
+        }
     assert_int_equal(set(0), JL_OK);    /* no mean again */
     for (i = 0; i < n; i++)
         assert_true(a->u[i] == 0);
@@ -328,6 +341,7 @@ static void fill_motion(struct rig *r, const jl_motion *motion, jl_real dt)
  * jl_mode_set of the same matrices. */
 static void check_motion(int kind, int axes, int order, jl_real dt)
 {
+    static jl_real G[MAX * MAX], Q[MAX * MAX];
     jl_motion motion = motion_of(kind, axes, order, JL_C(0.3));
     const jl_mode *a = &rig.mode;
     int n = axes * order, i, j, row, col;
@@ -355,19 +369,24 @@ static void check_motion(int kind, int axes, int order, jl_real dt)
                          same ? g[row] * g[col] * 1.69L : 0, tolerance);
         }
         for (j = 0; j < axes; j++) {
-            assert_close(a->G[i * axes + j], i / order == j ? g[row] : 0,
+            assert_close(a->N[j * n + i], i / order == j ? g[row] : 0,
                          tolerance);
             assert_true(a->H[j * n + i] == (jl_real)(i == j * order));
         }
     }
     for (i = 0; i < axes; i++)
         for (j = 0; j < axes; j++) {
-            assert_close(a->Q[i * axes + j], i == j ? 1.69 : 0, 4 * EPS);
+            Q[i * axes + j] = i == j ? a->q[i] : 0;
+            assert_close(Q[i * axes + j], i == j ? 1.69 : 0, 4 * EPS);
             assert_close(a->R[i * axes + j], i == j ? 0.49 : 0, EPS);
+            assert_close(a->V[i * axes + j], i == j ? 0.49 : 0, EPS);
         }
+    for (i = 0; i < n; i++)
+        for (j = 0; j < axes; j++)
+            G[i * axes + j] = a->N[j * n + i];
     make(&other, n, axes, axes);
-    assert_int_equal(jl_mode_set(&other.mode, a->F, a->G, a->Q, NULL, a->H,
-                                 a->R, scratch), JL_OK);
+    assert_int_equal(jl_mode_set(&other.mode, a->F, G, Q, NULL, a->H, a->R,
+                                 scratch), JL_OK);
     for (i = 0; i < n; i++)
         for (j = 0; j < n; j++) {
             assert_close(a->W[i * n + j], other.mode.W[i * n + j],

@@ -1,0 +1,63 @@
+/* Factors U' D U of positive semidefinite matrices. */
+#include "jumplink/mat.h"
+
+#include "mat/ud_k.h"
+
+/* The largest diagonal element left of B, in units of A's own; -1: none above
+ * rounding. */
+static int largest(const jl_real *B, const jl_real *diagonal, int n)
+{
+    jl_real most = 64 * (jl_real)n * JL_EPSILON;
+    int i, best = -1;
+
+    for (i = 0; i < n; i++)
+        if (diagonal[i] > 0 && B[i * (n + 1)] / diagonal[i] > most) {
+            most = B[i * (n + 1)] / diagonal[i];
+            best = i;
+        }
+    return best;
+}
+
+/* By rows in the order of pivots, for small pivots taken early would magnify
+ * rounding; each row goes into the triangle, which keeps the order of states. */
+void jl_mat_ud(jl_real *S, const jl_real *A, jl_real *work, int n)
+{
+    jl_real *B = work, *diagonal = B + n * n, *v = diagonal + n;
+    int i, j, b, left;
+
+    jli_copy(B, A, n * n);
+    for (i = 0; i < n; i++)
+        diagonal[i] = A[i * (n + 1)];
+    memset(S, 0, (size_t)(n * n) * sizeof *S);
+    for (left = n; left > 0; left--) {
+        jl_real d;
+
+        b = largest(B, diagonal, n);
+        if (b < 0)
+            return;
+        d = B[b * (n + 1)];
+        for (j = 0; j < n; j++)
+            v[j] = B[b * n + j] / d;
+        for (i = 0; i < n; i++)
+            for (j = 0; j < n; j++)
+                B[i * n + j] -= d * v[i] * v[j];
+        for (i = 0; i < n; i++)
+            B[i * n + b] = B[b * n + i] = 0;
+        jli_ud_absorb(S, v, d, 0, n);
+    }
+}
+
+void jl_mat_ud_product(jl_real *P, const jl_real *S, int n)
+{
+    int i, j, k;
+
+    for (i = 0; i < n; i++)
+        for (j = i; j < n; j++) {
+            jl_real s = S[i * n + i] * (i == j ? 1 : S[i * n + j]);
+
+            for (k = 0; k < i; k++)
+                s += S[k * n + k] * S[k * n + i] * S[k * n + j];
+            P[i * n + j] = s;
+            P[j * n + i] = s;
+        }
+}
