@@ -437,7 +437,7 @@ static int read_catalogue(struct model *model, const struct json_at *top)
         "kind", "axes", "order", "sigma_z", "v0_std", "a0_std",
         "sojourn_s", "Pi", "mu0", "modes", "x0", "P0", NULL
     };
-    jl_motion common = { 0, 0, 0, 0, 0, 0 };
+    jl_motion common = { 0, 0, 0, 0, 0, 0, 0 };
 
     if (json_only(top, keys) != 0
         || json_take_count(&common.axes, top, "axes", 1, JL_MAX_STATES / 3)
