@@ -193,7 +193,7 @@ static void test_singer_factor_is_eliminations(void **state)
     (void)state;
     if (LDBL_MANT_DIG < 64)
         skip();
-    for (theta = JL_C(1.0e-6); theta < 50; theta *= JL_C(1.07)) {
+    for (theta = JL_C(1.0e-6); theta < 50; theta *= JL_C(1.013)) {
         const jl_mode *a = &rig.mode;
         long double W[DIM][DIM], va, pa, pv;
 
