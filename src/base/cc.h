@@ -2,14 +2,20 @@
 #ifndef JL_CC_H
 #define JL_CC_H
 
-#if defined(__STDC_VERSION__) && __STDC_VERSION__ >= 199901L
+/* Always inline: a kernel that is called is one whose sizes are not known. */
+#if defined(__GNUC__)
+#  define JL_INLINE static __inline__ __attribute__((always_inline))
+#elif defined(__STDC_VERSION__) && __STDC_VERSION__ >= 199901L
 #  define JL_INLINE static inline
-#  define JL_RESTRICT restrict
-#elif defined(__GNUC__)
-#  define JL_INLINE static __inline__
-#  define JL_RESTRICT __restrict__
 #else
 #  define JL_INLINE static
+#endif
+
+#if defined(__STDC_VERSION__) && __STDC_VERSION__ >= 199901L
+#  define JL_RESTRICT restrict
+#elif defined(__GNUC__)
+#  define JL_RESTRICT __restrict__
+#else
 #  define JL_RESTRICT
 #endif
 

@@ -24,12 +24,7 @@ void jli_full_whole(jl_real *Sn, const jl_real *S, const int *map,
 JL_INLINE void jli_mean(jl_real *mean, const jl_real *w, const jl_real *x,
                         int M, int n)
 {
-    int i, a;
-
-    memset(mean, 0, (size_t)n * sizeof *mean);
-    for (i = 0; i < M; i++)
-        for (a = 0; a < n; a++)
-            mean[a] += w[i] * x[i * n + a];
+    jli_row(mean, NULL, JLI_ROW, w, 1, x, M, n);
 }
 
 /* d = x1 - x2, and a x1 + b x2, for a + b = 1, from where more weight is: near
@@ -46,42 +41,59 @@ JL_INLINE void jli_between(jl_real *x, jl_real *d, jl_real a,
         x[r] = a < b ? x2[r] + a * d[r] : x1[r] - b * d[r];
 }
 
-JL_INLINE void jli_full_pool(jl_real *mean, jl_real *P, const jl_real *w,
-                             const jl_real *x, const jl_real *Ps, jl_real *d,
-                             int M, int n)
+#define JLI_POOL_COLUMNS(type, width) \
+    for (; j + width <= n; j += width) \
+        *(type *)(P + r * n + j) += w[i] \
+            * (*(const type *)(Pi + r * n + j) \
+               + d[r] * *(const type *)(d + j));
+
+JL_INLINE void jli_full_pool(jl_real *JL_RESTRICT mean,
+                             jl_real *JL_RESTRICT P,
+                             const jl_real *JL_RESTRICT w,
+                             const jl_real *JL_RESTRICT x,
+                             const jl_real *JL_RESTRICT Ps,
+                             jl_real *JL_RESTRICT d, int M, int n)
 {
-    int i, a, b;
+    int i, r, j;
 
     jli_mean(mean, w, x, M, n);
     memset(P, 0, (size_t)(n * n) * sizeof *P);
     for (i = 0; i < M; i++) {
         const jl_real *Pi = Ps + i * n * n;
 
-        for (a = 0; a < n; a++)
-            d[a] = x[i * n + a] - mean[a];
-        for (a = 0; a < n; a++)
-            for (b = a; b < n; b++)
-                P[a * n + b] += w[i] * (Pi[a * n + b] + d[a] * d[b]);
+        for (r = 0; r < n; r++)
+            d[r] = x[i * n + r] - mean[r];
+        for (r = 0; r < n; r++) {
+            j = r - r % JLI_PACK;               /* from the diagonal on */
+            JLI_POOL_COLUMNS(jli_wide, JLI_WIDE)
+            JLI_POOL_COLUMNS(jli_pack, JLI_PACK)
+            JLI_POOL_COLUMNS(jl_real, 1)
+        }
     }
-    for (a = 0; a < n; a++)
-        for (b = 0; b < a; b++)
-            P[a * n + b] = P[b * n + a];
+    jli_mirror(P, n);
 }
+
+/* All of P at once; symmetric because its terms are. */
+#define JLI_BLEND_COLUMNS(type, width) \
+    for (; s + width <= n; s += width) \
+        *(type *)(P + r * n + s) = a * *(const type *)(P1 + r * n + s) \
+            + b * *(const type *)(P2 + r * n + s) \
+            + a * b * (d[r] * *(const type *)(d + s));
 
 JL_INLINE void jli_full_blend(jl_real *x, jl_real *P, jl_real a,
                               const jl_real *x1, const jl_real *P1, jl_real b,
-                              const jl_real *x2, const jl_real *P2, jl_real *d,
-                              int n)
+                              const jl_real *x2, const jl_real *P2,
+                              jl_real *JL_RESTRICT d, int n)
 {
     int r, s;
 
     jli_between(x, d, a, x1, b, x2, n);
-    for (r = 0; r < n; r++)
-        for (s = r; s < n; s++) {
-            P[r * n + s] = a * P1[r * n + s] + b * P2[r * n + s]
-                + a * b * (d[r] * d[s]);
-            P[s * n + r] = P[r * n + s];
-        }
+    for (r = 0; r < n; r++) {
+        s = 0;
+        JLI_BLEND_COLUMNS(jli_wide, JLI_WIDE)
+        JLI_BLEND_COLUMNS(jli_pack, JLI_PACK)
+        JLI_BLEND_COLUMNS(jl_real, 1)
+    }
 }
 
 #endif

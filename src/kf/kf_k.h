@@ -9,19 +9,45 @@
 
 #define JLI_LOG_2PI JL_C(1.8378770664093454836)
 
-JL_INLINE int jli_estimate_ok(const jl_real *x, const jl_real *P, int n)
+/* *wide + *one is more by the sum of squares of v [n], in any order. */
+#define JLI_SQUARES(type, width, sum) \
+    for (; i + width <= n; i += width) \
+        sum += *(const type *)(v + i) * *(const type *)(v + i);
+
+JL_INLINE void jli_squares(jli_wide *wide, jl_real *one, const jl_real *v,
+                           int n)
 {
-    return jl_vec_within(x, n, JL_LARGE)
-        && jl_vec_within(P, n * n, JL_LARGE * JL_LARGE);
+    int i = 0;
+
+    JLI_SQUARES(jli_wide, JLI_WIDE, *wide)
+    JLI_SQUARES(jl_real, 1, *one)
 }
 
-/* x- = f(x) + u, P- = F P F' + W; scratch [2 n n + 3 n] */
+/* Whether an estimate is finite and no larger than JL_LARGE allows.  As long as
+ * all squares sum up to less than JL_LARGE^2, it is: NaN does not. */
+JL_INLINE int jli_estimate_ok(const jl_real *x, const jl_real *P, int n)
+{
+    jli_wide wide = { 0 };
+    jl_real sum = 0, lane[JLI_WIDE];
+    int i;
+
+    jli_squares(&wide, &sum, x, n);
+    jli_squares(&wide, &sum, P, n * n);
+    *(jli_wide *)lane = wide;
+    for (i = 0; i < JLI_WIDE; i++)
+        sum += lane[i];
+    return sum <= JL_LARGE * JL_LARGE
+        || (jl_vec_within(x, n, JL_LARGE)
+            && jl_vec_within(P, n * n, JL_LARGE * JL_LARGE));
+}
+
+/* x- = f(x) + u, P- = F (P F') + W; scratch [3 n n + 3 n] */
 JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
                              const jl_real *x, const jl_real *P,
                              jl_real *scratch, int n)
 {
     const jl_real *F = mode->F;
-    jl_real *T = scratch + n * n;
+    jl_real *T = scratch + n * n, *U = T + n * n;
     int status;
 
     if (mode->move != NULL) {
@@ -29,12 +55,22 @@ JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
         status = mode->move(xp, scratch, mode, x, T);
         if (status != JL_OK)
             return status;
-    } else {
-        jli_apply(xp, F, x, mode->u, n, n);
     }
-    jli_mul(T, F, P, n, n, n);
-    jli_mul_t_sym(Pp, T, F, mode->W, n, n);
+    jli_transpose(T, F, n, n);
+    if (mode->move == NULL)
+        jli_row(xp, mode->u, JLI_PLUS_ROW, x, 1, T, n, n);
+    jli_mul(U, P, T, n, n, n);
+    jli_mul_sym(Pp, F, U, mode->W, n);
     return jli_estimate_ok(xp, Pp, n) ? JL_OK : JL_ENONFINITE;
+}
+
+JL_INLINE int jli_vector_ok(const jl_real *v, int n)
+{
+    int i, ok = 1;
+
+    for (i = 0; i < n; i++)
+        ok &= v[i] >= -JL_LARGE && v[i] <= JL_LARGE;    /* false for NaN */
+    return ok;
 }
 
 /* nu = z - h(x-), and the H to go with it: the mode's, or a Jacobian in
@@ -45,7 +81,7 @@ JL_INLINE int jli_kf_sense(jl_real *nu, const jl_real **H,
 {
     int a;
 
-    if (!jl_vec_within(z, m, JL_LARGE))
+    if (!jli_vector_ok(z, m))
         return JL_ENONFINITE;
     if (mode->sense != NULL) {
         *H = scratch;
@@ -58,39 +94,73 @@ JL_INLINE int jli_kf_sense(jl_real *nu, const jl_real **H,
     return JL_OK;
 }
 
-/* What the forms of the update share, all from the factor S = L L':
- *     HP  [m,n]  H P-
- *     L   [m,m]
- *     y   [m]    L^-1 nu, of the innovation's nu
- *     loglik = -(m log 2 pi + log det S + y'y) / 2 */
-JL_INLINE int jli_kf_innovate(jl_real *HP, jl_real *L, jl_real *y,
-                              jl_innovation *innovation, const jl_real *H,
-                              const jl_real *R, const jl_real *Pp,
-                              int n, int m)
+JL_INLINE int jli_normal(jl_real x)
 {
-    jl_real twice = (jl_real)m * JLI_LOG_2PI;
+    return x >= JL_REAL_MIN && x <= JL_REAL_MAX;
+}
+
+/* sum log d_a: one logarithm, of the product, unless that leaves the range in
+ * which numbers have all digits. */
+JL_INLINE jl_real jli_log_product(const jl_real *d, int m)
+{
+    jl_real product = d[0], sum = 0;
     int a;
 
-    jli_mul(HP, H, Pp, m, n, n);
-    jli_mul_t_sym(L, HP, H, R, m, n);
-    if (!jl_vec_within(L, m * m, JL_REAL_MAX))
-        return JL_ENONFINITE;
-    if (jli_cholesky(L, L, m) != JL_OK)
-        return JL_ESINGULAR;
-    jli_copy(y, innovation->nu, m);
-    jli_lower_solve(L, y, m, 1);
-    innovation->nis = 0;
+    for (a = 1; a < m && jli_normal(product); a++)
+        product *= d[a];
+    if (jli_normal(product))
+        return jl_log(product);
+    for (a = 0; a < m; a++)
+        sum += jl_log(d[a]);
+    return sum;
+}
+
+/* What the forms of the update share, all from S = H P- H' + R = L D L':
+ *     Y  [m,n]   D^-1/2 L^-1 H P-
+ *     y  [m]     D^-1/2 L^-1 nu, of the innovation's nu
+ *     S  [m,m]   L below the diagonal
+ *     r  [m]     D^-1/2
+ *     nis = y'y,  loglik = -(m log 2 pi + log det D + nis) / 2
+ * scratch [m] */
+JL_INLINE int jli_kf_innovate(jl_real *Y, jl_real *y, jl_real *S, jl_real *r,
+                              jl_innovation *innovation, const jl_real *H,
+                              const jl_real *R, const jl_real *Pp,
+                              jl_real *d, int n, int m)
+{
+    jl_real twice = (jl_real)m * JLI_LOG_2PI, nis = 0;
+    int a, b, k, j, status;
+
+    jli_mul(Y, H, Pp, m, n, n);
+    for (a = 0; a < m; a++)
+        for (b = 0; b <= a; b++) {
+            jl_real s = R[a * m + b];
+
+            for (k = 0; k < n; k++)
+                s += Y[a * n + k] * H[b * n + k];
+            S[a * m + b] = s;
+        }
+    status = jli_ldl(S, d, r, m);
+    if (status != JL_OK)
+        return status == JL_EDEF ? JL_ESINGULAR : status;
+    for (a = 0; a < m; a++)
+        y[a] = innovation->nu[a];
+    jli_unit_solve(S, Y, m, n);
+    jli_unit_solve(S, y, m, 1);
     for (a = 0; a < m; a++) {
-        innovation->nis += y[a] * y[a];
-        twice += 2 * jl_log(L[a * m + a]);
+        r[a] *= jli_sqrt(d[a]);
+        for (j = 0; j < n; j++)
+            Y[a * n + j] *= r[a];
+        y[a] *= r[a];
+        nis += y[a] * y[a];
     }
-    twice += innovation->nis;
+    twice += jli_log_product(d, m) + nis;
+    innovation->nis = nis;
     innovation->loglik = -twice / 2;
     return jli_finite(twice) ? JL_OK : JL_ENONFINITE;
 }
 
 /* x = x- + K nu, P = (I - K H) P- (I - K H)' + K R K'
- * scratch [2 n n + 3 n m + m m + 3 m + n] */
+ * scratch [3 n n + 2 n m + m m + 3 m] */
 JL_INLINE int jli_kf_update_joseph(jl_real *x, jl_real *P,
                                    jl_innovation *innovation,
                                    const jl_mode *mode, const jl_real *xp,
@@ -98,49 +168,53 @@ JL_INLINE int jli_kf_update_joseph(jl_real *x, jl_real *P,
                                    jl_real *scratch, int n, int m)
 {
     const jl_real *H;
-    jl_real *HP = scratch, *K = HP + m * n, *L = K + n * m, *y = L + m * m;
-    jl_real *A = y + m, *T = A + n * n;
-    int i, j, a, b, status;
+    jl_real *K = scratch, *V = K + m * n, *S = V + m * n, *y = S + m * m;
+    jl_real *r = y + m, *d = r + m, *A = d + m, *T = A + n * n;
+    jl_real *U = T + n * n;
+    int i, j, a, status;
 
-    status = jli_kf_sense(innovation->nu, &H, mode, xp, z, T + n * n, n, m);
+    status = jli_kf_sense(innovation->nu, &H, mode, xp, z, U, n, m);
     if (status == JL_OK)
-        status = jli_kf_innovate(HP, L, y, innovation, H, mode->R, Pp, n, m);
+        status = jli_kf_innovate(K, y, S, r, innovation, H, mode->R, Pp, d, n,
+                                 m);
     if (status != JL_OK)
         return status;
-    jli_lower_solve(L, HP, m, n);               /* L^-1 H P-                */
-    for (i = 0; i < n; i++) {
-        jl_real s = 0;
-
-        for (a = 0; a < m; a++)
-            s += HP[a * n + i] * y[a];
-        x[i] = xp[i] + s;
-    }
-    jli_lower_t_solve(L, HP, m, n);             /* K' = S^-1 H P-           */
-    for (i = 0; i < n; i++)
-        for (a = 0; a < m; a++)
-            K[i * m + a] = HP[a * n + i];
-    jli_mul(A, K, H, n, m, n);
-    for (i = 0; i < n; i++)
+    jli_row(x, xp, JLI_PLUS_ROW, y, 1, K, m, n);
+    for (a = 0; a < m; a++)
         for (j = 0; j < n; j++)
-            A[i * n + j] = (jl_real)(i == j) - A[i * n + j];
-    jli_mul(T, A, Pp, n, n, n);
-    jli_mul(HP, K, mode->R, n, m, m);           /* K R [n,m]                */
+            K[a * n + j] *= r[a];
+    jli_unit_t_solve(S, K, m, n);               /* K' = S^-1 H P-           */
+    for (i = 0; i < n; i++) {
+        for (j = 0; j < n; j++)
+            A[i * n + j] = (jl_real)(i == j);
+        jli_row(A + i * n, A + i * n, JLI_MINUS_ROW, K + i, n, H, m, n);
+    }
+    jli_transpose(T, A, n, n);
+    jli_mul(U, Pp, T, n, n, n);
+    jli_mul(V, mode->R, K, m, m, n);            /* R K'                     */
     for (i = 0; i < n; i++)
-        for (j = i; j < n; j++) {
-            jl_real s = 0, r = 0;
-
-            for (a = 0; a < n; a++)
-                s += T[i * n + a] * A[j * n + a];
-            for (b = 0; b < m; b++)
-                r += HP[i * m + b] * K[j * m + b];
-            P[i * n + j] = s + r;
-            P[j * n + i] = s + r;
-        }
+        jli_row(T + i * n, NULL, JLI_ROW, K + i, n, V, m, n);
+    jli_mul_sym(P, A, U, T, n);
     return jli_estimate_ok(x, P, n) ? JL_OK : JL_ENONFINITE;
 }
 
-/* With Y = L^-1 H P-:  x = x- + Y'y, P = P- - Y'Y = P- - K S K'
- * scratch [2 n m + m m + 3 m + n] */
+/* The same for P = P- - Y'Y of a P- that is within bounds.  Then its diagonal
+ * tells: Y_i^2 <= P-_ii - P_ii in each of its columns i, and the other elements
+ * of Y'Y are not larger than the greatest of the diagonal. */
+JL_INLINE int jli_update_ok(const jl_real *x, const jl_real *P, int n)
+{
+    jl_real sum = 0;
+    int i;
+
+    for (i = 0; i < n; i++)
+        sum += x[i] * x[i] + P[i * (n + 1)] * P[i * (n + 1)];
+    return sum <= JL_LARGE * JL_LARGE
+        || (jl_vec_within(x, n, JL_LARGE)
+            && jl_vec_within(P, n * n, JL_LARGE * JL_LARGE));
+}
+
+/* x = x- + Y'y, P = P- - Y'Y, symmetric because its terms are
+ * scratch [2 n m + m m + 4 m + n] */
 JL_INLINE int jli_kf_update_standard(jl_real *x, jl_real *P,
                                      jl_innovation *innovation,
                                      const jl_mode *mode, const jl_real *xp,
@@ -148,30 +222,20 @@ JL_INLINE int jli_kf_update_standard(jl_real *x, jl_real *P,
                                      jl_real *scratch, int n, int m)
 {
     const jl_real *H;
-    jl_real *Y = scratch, *L = Y + m * n, *y = L + m * m;
-    int i, j, a, status;
+    jl_real *Y = scratch, *S = Y + m * n, *y = S + m * m, *r = y + m;
+    jl_real *d = r + m;
+    int i, status;
 
-    status = jli_kf_sense(innovation->nu, &H, mode, xp, z, y + m, n, m);
+    status = jli_kf_sense(innovation->nu, &H, mode, xp, z, d + m, n, m);
     if (status == JL_OK)
-        status = jli_kf_innovate(Y, L, y, innovation, H, mode->R, Pp, n, m);
+        status = jli_kf_innovate(Y, y, S, r, innovation, H, mode->R, Pp, d, n,
+                                 m);
     if (status != JL_OK)
         return status;
-    jli_lower_solve(L, Y, m, n);
-    for (i = 0; i < n; i++) {
-        jl_real s = 0;
-
-        for (a = 0; a < m; a++)
-            s += Y[a * n + i] * y[a];
-        x[i] = xp[i] + s;
-        for (j = i; j < n; j++) {
-            s = 0;
-            for (a = 0; a < m; a++)
-                s += Y[a * n + i] * Y[a * n + j];
-            P[i * n + j] = Pp[i * n + j] - s;
-            P[j * n + i] = P[i * n + j];
-        }
-    }
-    return jli_estimate_ok(x, P, n) ? JL_OK : JL_ENONFINITE;
+    jli_row(x, xp, JLI_PLUS_ROW, y, 1, Y, m, n);
+    for (i = 0; i < n; i++)
+        jli_row(P + i * n, Pp + i * n, JLI_MINUS_ROW, Y + i, n, Y, m, n);
+    return jli_update_ok(x, P, n) ? JL_OK : JL_ENONFINITE;
 }
 
 #endif

@@ -1,0 +1,27 @@
+/* Several reals that the machine adds and multiplies at once. */
+#ifndef JL_LANES_H
+#define JL_LANES_H
+
+#include "jumplink/base.h"
+
+/* jli_wide and jli_pack hold JLI_WIDE and JLI_PACK reals, from anywhere in an
+ * array of reals; 1 where the machine or the compiler has nothing of the kind. */
+#if defined(__GNUC__) && (defined(__SSE2__) || defined(__ARM_NEON))
+#  if defined(__AVX__)
+#    define JLI_WIDEST 32
+#  else
+#    define JLI_WIDEST 16
+#  endif
+#  define JLI_WIDE (JLI_WIDEST / (int)sizeof(jl_real))
+#  define JLI_PACK (16 / (int)sizeof(jl_real))
+typedef jl_real jli_wide __attribute__((vector_size(JLI_WIDEST),
+                                        aligned(sizeof(jl_real)), may_alias));
+typedef jl_real jli_pack __attribute__((vector_size(16),
+                                        aligned(sizeof(jl_real)), may_alias));
+#else
+#  define JLI_WIDE 1
+#  define JLI_PACK 1
+typedef jl_real jli_wide, jli_pack;
+#endif
+
+#endif
