@@ -44,25 +44,22 @@ JL_INLINE void jli_between(jl_real *x, jl_real *d, jl_real a,
 #define JLI_POOL_COLUMNS(type, width) \
     for (; j + width <= n; j += width) \
         *(type *)(P + r * n + j) += w[i] \
-            * (*(const type *)(Pi + r * n + j) \
-               + d[r] * *(const type *)(d + j));
+            * (*(const type *)(Pi + r * n + j) + (xi[r] - mean[r]) \
+               * (*(const type *)(xi + j) - *(const type *)(mean + j)));
 
 JL_INLINE void jli_full_pool(jl_real *JL_RESTRICT mean,
                              jl_real *JL_RESTRICT P,
                              const jl_real *JL_RESTRICT w,
                              const jl_real *JL_RESTRICT x,
-                             const jl_real *JL_RESTRICT Ps,
-                             jl_real *JL_RESTRICT d, int M, int n)
+                             const jl_real *JL_RESTRICT Ps, int M, int n)
 {
     int i, r, j;
 
     jli_mean(mean, w, x, M, n);
     memset(P, 0, (size_t)(n * n) * sizeof *P);
     for (i = 0; i < M; i++) {
-        const jl_real *Pi = Ps + i * n * n;
+        const jl_real *xi = x + i * n, *Pi = Ps + i * n * n;
 
-        for (r = 0; r < n; r++)
-            d[r] = x[i * n + r] - mean[r];
         for (r = 0; r < n; r++) {
             j = r - r % JLI_PACK;               /* from the diagonal on */
             JLI_POOL_COLUMNS(jli_wide, JLI_WIDE)

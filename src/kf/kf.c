@@ -70,81 +70,90 @@ int jl_kf_gate(jl_kf *kf, jl_real nis, int most)
 
 int jl_kf_predict(jl_kf *kf, jl_real *scratch)
 {
-    int n = kf->mode->n, status;
-    jl_real *x = scratch, *P = x + n;
+    int n = kf->mode->n, size = n + n * n, status;
+    jl_real *before = scratch, *rest = before + size;
 
-    status = kf->form->predict(x, P, kf->mode, kf->x, kf->P, P + n * n);
-    if (status == JL_OK)
-        jli_copy(kf->x, x, n + n * n);
+    jli_copy(before, kf->x, size);              /* x and P */
+    status = kf->form->predict(kf->x, kf->P, kf->mode, before, before + n,
+                               rest);
+    if (status != JL_OK)
+        jli_copy(kf->x, before, size);
     return status;
 }
 
-/* Take down what an update gave: the estimate xP [n + n n] unless the gate
- * rejects it.  Returns 1 if it is accepted. */
-static int commit(jl_kf *kf, const jl_real *xP, const jl_innovation *got)
+/* Whether the gate rejects it. */
+static int rejects(const jl_kf *kf, jl_real nis)
+{
+    return kf->gate > 0 && nis > kf->gate && kf->run < kf->most;
+}
+
+/* Take down what an update gave. */
+static void count(jl_kf *kf, const jl_innovation *got)
 {
     jl_real *nu = kf->innovation.nu;
-    int n = kf->mode->n;
 
     jli_copy(nu, got->nu, kf->mode->m);
     kf->innovation = *got;
     kf->innovation.nu = nu;
-    if (kf->gate > 0 && got->nis > kf->gate && kf->run < kf->most) {
+    if (rejects(kf, got->nis)) {
         kf->run++;
         kf->rejected++;
-        return 0;
+    } else {
+        kf->run = 0;
+        kf->accepted++;
+        kf->nis_mean += (got->nis - kf->nis_mean) / (jl_real)kf->accepted;
     }
-    kf->run = 0;
-    kf->accepted++;
-    kf->nis_mean += (got->nis - kf->nis_mean) / (jl_real)kf->accepted;
-    jli_copy(kf->x, xP, n + n * n);
-    return 1;
+}
+
+/* Update from the estimate `prior`, which is also what a measurement that is
+ * missing or rejected leaves; what becomes of the filter otherwise is written to
+ * it at once, and on failure it is as in `before`.  x and P lie together. */
+static int update(jl_kf *kf, jl_real *loglik, const jl_real *z,
+                  const jl_real *prior, const jl_real *before,
+                  jl_real *scratch)
+{
+    int n = kf->mode->n, size = n + n * n, status;
+    jl_innovation got;
+
+    got.nu = scratch;
+    got.loglik = 0;
+    if (z != NULL) {
+        status = kf->form->update(kf->x, kf->P, &got, kf->mode, prior,
+                                  prior + n, z, scratch + kf->mode->m);
+        if (status != JL_OK) {
+            jli_copy(kf->x, before, size);
+            return status;
+        }
+        count(kf, &got);
+    }
+    if (z == NULL || kf->run > 0) {
+        jli_copy(kf->x, prior, size);
+        got.loglik = 0;
+    }
+    if (loglik != NULL)
+        *loglik = got.loglik;
+    return JL_OK;
 }
 
 int jl_kf_update(jl_kf *kf, jl_real *loglik, const jl_real *z,
                  jl_real *scratch)
 {
-    int n = kf->mode->n, status;
-    jl_real *x = scratch, *P = x + n, l = 0;
-    jl_innovation got;
+    int n = kf->mode->n, size = n + n * n;
 
-    if (z != NULL) {
-        got.nu = P + n * n;
-        status = kf->form->update(x, P, &got, kf->mode, kf->x, kf->P, z,
-                                  got.nu + kf->mode->m);
-        if (status != JL_OK)
-            return status;
-        if (commit(kf, x, &got))
-            l = got.loglik;
-    }
-    if (loglik != NULL)
-        *loglik = l;
-    return JL_OK;
+    jli_copy(scratch, kf->x, size);
+    return update(kf, loglik, z, scratch, scratch, scratch + size);
 }
 
 int jl_kf_step(jl_kf *kf, jl_real *loglik, const jl_real *z,
                jl_real *scratch)
 {
-    int n = kf->mode->n, status;
-    jl_real *xp = scratch, *x = xp + n + n * n, *nu = x + n + n * n, l = 0;
-    jl_real *rest = nu + kf->mode->m;
-    jl_innovation got;
+    int n = kf->mode->n, size = n + n * n, status;
+    jl_real *before = scratch, *prior = before + size, *rest = prior + size;
 
-    status = kf->form->predict(xp, xp + n, kf->mode, kf->x, kf->P, rest);
+    status = kf->form->predict(prior, prior + n, kf->mode, kf->x, kf->P,
+                               rest);
     if (status != JL_OK)
         return status;
-    if (z != NULL) {
-        got.nu = nu;
-        status = kf->form->update(x, x + n, &got, kf->mode, xp, xp + n, z,
-                                  rest);
-        if (status != JL_OK)
-            return status;
-        if (commit(kf, x, &got))
-            l = got.loglik;
-    }
-    if (z == NULL || kf->run > 0)
-        jli_copy(kf->x, xp, n + n * n);         /* x and P */
-    if (loglik != NULL)
-        *loglik = l;
-    return JL_OK;
+    jli_copy(before, kf->x, size);
+    return update(kf, loglik, z, prior, before, rest);
 }

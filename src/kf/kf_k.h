@@ -9,36 +9,62 @@
 
 #define JLI_LOG_2PI JL_C(1.8378770664093454836)
 
-/* *wide + *one is more by the sum of squares of v [n], in any order. */
+/* A sum of squares, in any order, as it comes by rows. */
+struct jli_squares {
+    jli_wide wide;
+    jli_pack pack;
+    jl_real one;
+};
+
 #define JLI_SQUARES(type, width, sum) \
     for (; i + width <= n; i += width) \
         sum += *(const type *)(v + i) * *(const type *)(v + i);
 
-JL_INLINE void jli_squares(jli_wide *wide, jl_real *one, const jl_real *v,
-                           int n)
+JL_INLINE void jli_square(struct jli_squares *sum, const jl_real *v, int n)
 {
     int i = 0;
 
-    JLI_SQUARES(jli_wide, JLI_WIDE, *wide)
-    JLI_SQUARES(jl_real, 1, *one)
+    JLI_SQUARES(jli_wide, JLI_WIDE, sum->wide)
+    JLI_SQUARES(jli_pack, JLI_PACK, sum->pack)
+    JLI_SQUARES(jl_real, 1, sum->one)
 }
 
-/* Whether an estimate is finite and no larger than JL_LARGE allows.  As long as
- * all squares sum up to less than JL_LARGE^2, it is: NaN does not. */
-JL_INLINE int jli_estimate_ok(const jl_real *x, const jl_real *P, int n)
+JL_INLINE jl_real jli_square_sum(const struct jli_squares *sum)
 {
-    jli_wide wide = { 0 };
-    jl_real sum = 0, lane[JLI_WIDE];
+    jl_real lane[JLI_WIDE + JLI_PACK], s = sum->one;
     int i;
 
-    jli_squares(&wide, &sum, x, n);
-    jli_squares(&wide, &sum, P, n * n);
-    *(jli_wide *)lane = wide;
-    for (i = 0; i < JLI_WIDE; i++)
-        sum += lane[i];
-    return sum <= JL_LARGE * JL_LARGE
+    *(jli_wide *)lane = sum->wide;
+    *(jli_pack *)(lane + JLI_WIDE) = sum->pack;
+    for (i = 0; i < JLI_WIDE + JLI_PACK; i++)
+        s += lane[i];
+    return s;
+}
+
+/* Whether an estimate is finite and within JL_LARGE.  It is when the sum of all
+ * its squares is within JL_LARGE^2, as nearly always: one look at each element,
+ * and NaN does not pass. */
+JL_INLINE int jli_estimate_ok(const struct jli_squares *sum, const jl_real *x,
+                              const jl_real *P, int n)
+{
+    return jli_square_sum(sum) <= JL_LARGE * JL_LARGE
         || (jl_vec_within(x, n, JL_LARGE)
             && jl_vec_within(P, n * n, JL_LARGE * JL_LARGE));
+}
+
+/* C = A B + Q, known to be symmetric; A, B, Q [n,n] */
+JL_INLINE void jli_mul_sym(jl_real *JL_RESTRICT C, struct jli_squares *sum,
+                           const jl_real *JL_RESTRICT A,
+                           const jl_real *JL_RESTRICT B,
+                           const jl_real *JL_RESTRICT Q, int n)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        jli_row(C + i * n, Q + i * n, JLI_PLUS_ROW, A + i * n, 1, B, n, n);
+        jli_square(sum, C + i * n, n);
+    }
+    jli_mirror(C, n);
 }
 
 /* x- = f(x) + u, P- = F (P F') + W; scratch [3 n n + 3 n] */
@@ -48,6 +74,7 @@ JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
 {
     const jl_real *F = mode->F;
     jl_real *T = scratch + n * n, *U = T + n * n;
+    struct jli_squares sum = { { 0 }, { 0 }, 0 };
     int status;
 
     if (mode->move != NULL) {
@@ -60,8 +87,9 @@ JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
     if (mode->move == NULL)
         jli_row(xp, mode->u, JLI_PLUS_ROW, x, 1, T, n, n);
     jli_mul(U, P, T, n, n, n);
-    jli_mul_sym(Pp, F, U, mode->W, n);
-    return jli_estimate_ok(xp, Pp, n) ? JL_OK : JL_ENONFINITE;
+    jli_square(&sum, xp, n);
+    jli_mul_sym(Pp, &sum, F, U, mode->W, n);
+    return jli_estimate_ok(&sum, xp, Pp, n) ? JL_OK : JL_ENONFINITE;
 }
 
 JL_INLINE int jli_vector_ok(const jl_real *v, int n)
@@ -171,6 +199,7 @@ JL_INLINE int jli_kf_update_joseph(jl_real *x, jl_real *P,
     jl_real *K = scratch, *V = K + m * n, *S = V + m * n, *y = S + m * m;
     jl_real *r = y + m, *d = r + m, *A = d + m, *T = A + n * n;
     jl_real *U = T + n * n;
+    struct jli_squares sum = { { 0 }, { 0 }, 0 };
     int i, j, a, status;
 
     status = jli_kf_sense(innovation->nu, &H, mode, xp, z, U, n, m);
@@ -194,8 +223,9 @@ JL_INLINE int jli_kf_update_joseph(jl_real *x, jl_real *P,
     jli_mul(V, mode->R, K, m, m, n);            /* R K'                     */
     for (i = 0; i < n; i++)
         jli_row(T + i * n, NULL, JLI_ROW, K + i, n, V, m, n);
-    jli_mul_sym(P, A, U, T, n);
-    return jli_estimate_ok(x, P, n) ? JL_OK : JL_ENONFINITE;
+    jli_square(&sum, x, n);
+    jli_mul_sym(P, &sum, A, U, T, n);
+    return jli_estimate_ok(&sum, x, P, n) ? JL_OK : JL_ENONFINITE;
 }
 
 /* The same for P = P- - Y'Y of a P- that is within bounds.  Then its diagonal

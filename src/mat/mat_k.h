@@ -96,19 +96,6 @@ JL_INLINE void jli_mul_t(jl_real *C, const jl_real *A, const jl_real *B,
         }
 }
 
-/* C = Q + A B, known to be symmetric; A, B, Q [n,n] */
-JL_INLINE void jli_mul_sym(jl_real *JL_RESTRICT C,
-                           const jl_real *JL_RESTRICT A,
-                           const jl_real *JL_RESTRICT B,
-                           const jl_real *JL_RESTRICT Q, int n)
-{
-    int i;
-
-    for (i = 0; i < n; i++)
-        jli_row(C + i * n, Q + i * n, JLI_PLUS_ROW, A + i * n, 1, B, n, n);
-    jli_mirror(C, n);
-}
-
 /* C = T A' + Q, known to be symmetric; T, A [n,m]; Q [n,n] or NULL. */
 JL_INLINE void jli_mul_t_sym(jl_real *C, const jl_real *T, const jl_real *A,
                              const jl_real *Q, int n, int m)
