@@ -12,13 +12,13 @@
 
 #define TYPE jl_real
 #define NAME(x) textbook_##x
-#include "textbook.h"
+#include "textbook.inc"
 #undef TYPE
 #undef NAME
 
 #define TYPE long double                /* the reference: by logarithms */
 #define NAME(x) exact_##x
-#include "textbook.h"
+#include "textbook.inc"
 #undef TYPE
 #undef NAME
 
