@@ -158,7 +158,7 @@ static struct distance textbook_off(const struct imm_case *c, int products,
 
 /* What `hard` needs of a plain covariance, and the forms that give it. */
 static const struct distance hard = { 5e-3, 2e-4, 5e-6, 5e-7 };
-static const jl_kf_form *const sound[] = { &jl_kf_joseph };
+static const jl_kf_form *const sound[] = { &jl_kf_joseph, &jl_kf_sqrt };
 
 #define SOUND (sizeof sound / sizeof *sound)
 
@@ -298,6 +298,7 @@ static void test_trap_products_of_likelihoods(void **state)
     for (i = 0; i < 2; i++) {
         check_outlier(names[i], &jl_kf_joseph);
         check_outlier(names[i], &jl_kf_standard);
+        check_outlier(names[i], &jl_kf_sqrt);
     }
 }
 

@@ -184,6 +184,7 @@ static void test_imm_of_motions_is_of_their_matrices(void **state)
     (void)state;
     run(&jl_kf_joseph);
     run(&jl_kf_standard);
+    run(&jl_kf_sqrt);
 }
 
 int main(void)
