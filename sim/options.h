@@ -60,8 +60,8 @@ struct options {
 #define COMMON_HELP \
     "  --filter imm|kf   all modes (default), or the Kalman filter of one\n" \
     "  --mode J          ... of this one, from 0 (default: the only one)\n" \
-    "  --form joseph|standard  how covariances are updated (default\n" \
-    "                    joseph)\n"
+    "  --form joseph|standard|sqrt  how covariances are kept and updated\n" \
+    "                    (default joseph; sqrt: as factors)\n"
 #define DATA_HELP \
     "  --hold HOW        which measurements count as lost: none; detect:\n" \
     "                    those that repeat the row before exactly; column:\n" \
@@ -99,6 +99,9 @@ void options_init(struct options *options, const char *command);
 
 /* The topology's name. */
 const char *options_topology(const struct options *options);
+
+/* The form's name: "joseph". */
+const char *options_form(const struct options *options);
 
 /* getopt_long's short options: those of COMMON_OPTIONS, and no words of its
  * own about wrong ones. */
