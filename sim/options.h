@@ -60,8 +60,8 @@ struct options {
 #define COMMON_HELP \
     "  --filter imm|kf   all modes (default), or the Kalman filter of one\n" \
     "  --mode J          ... of this one, from 0 (default: the only one)\n" \
-    "  --form joseph|standard  how covariances are updated (default\n" \
-    "                    joseph)\n"
+    "  --form joseph|standard|sqrt  how covariances are kept and updated\n" \
+    "                    (default joseph; sqrt: as factors)\n"
 #define MODEL_HELP \
     "The model is JSON.  Modes of the catalogue follow any time step; each\n" \
     "has an accel_std and a type: cv; ca (order 3); ct (axes 2), with a\n" \
@@ -105,6 +105,9 @@ void options_init(struct options *options, const char *command);
 
 /* The topology's name. */
 const char *options_topology(const struct options *options);
+
+/* The form's name: "joseph". */
+const char *options_form(const struct options *options);
 
 /* getopt_long's short options: those of COMMON_OPTIONS, and no words of its
  * own about wrong ones. */

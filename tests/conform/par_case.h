@@ -25,6 +25,10 @@ struct par_shape {
                                    nobody does                              */
 };
 
+static const jl_kf_form *const par_forms[] = { &jl_kf_joseph, &jl_kf_standard,
+                                               &jl_kf_sqrt };
+#define PAR_FORMS 3
+
 #define PAR_ASLEEP_US 1000000000L
 
 /* Every PE builds its own. */

@@ -95,6 +95,7 @@ static void test_par_gives_serial_bits_over_lcm_and_topologies(void **state)
          s.topology++)
         for (s.npe = 1; s.npe <= 8; s.npe++) {
             s.sticky = s.npe % 2;
+            s.form = par_forms[s.npe / 2 % PAR_FORMS];
             compare(&s);
         }
 }

@@ -75,12 +75,12 @@ static void compare(struct run *run, int slots)
 static void compare_all(struct run *run)
 {
     struct par_shape *s = &run->shape;
-    int slots, forms;
+    int slots, f;
 
     for (s->sticky = 0; s->sticky < 2; s->sticky++)
         for (slots = 0; slots <= 2; slots++)
-            for (forms = 0; forms < 2; forms++) {
-                s->form = forms == 0 ? &jl_kf_joseph : &jl_kf_standard;
+            for (f = 0; f < PAR_FORMS; f++) {
+                s->form = par_forms[f];
                 compare(run, slots);
             }
 }
@@ -165,15 +165,14 @@ static void assert_close_trace(const struct par_trace *a,
     }
 }
 
-static void test_par_reduce_equals_serial_up_to_rounding(void **state)
+static void check_reduce(const jl_kf_form *form)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
     static struct par_trace serial, full;
     struct par_shape *s = &run.shape;
     int slots;
 
-    (void)state;
-    s->form = &jl_kf_joseph;
+    s->form = form;
     s->sticky = 1;
     s->exchange = JL_EXCHANGE_REDUCE;
     for (s->M = 1; s->M <= PAR_M; s->M += 2)
@@ -189,6 +188,13 @@ static void test_par_reduce_equals_serial_up_to_rounding(void **state)
                     assert_same_bits(&run.trace, &full, sizeof full);
                 }
         }
+}
+
+static void test_par_reduce_equals_serial_up_to_rounding(void **state)
+{
+    (void)state;
+    check_reduce(&jl_kf_joseph);
+    check_reduce(&jl_kf_sqrt);
 }
 
 static void test_par_reduce_refuses_a_chain_that_is_not_sticky(void **state)

@@ -47,7 +47,7 @@ static void test_par_gives_serial_bits_on_threads(void **state)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
     struct par_shape *s = &run.shape;
-    int slots, forms;
+    int slots, f;
 
     (void)state;
     s->M = PAR_M;
@@ -56,9 +56,8 @@ static void test_par_gives_serial_bits_on_threads(void **state)
         for (s->npe = 1; s->npe <= 8; s->npe++)
             for (s->sticky = 0; s->sticky < 2; s->sticky++)
                 for (slots = 0; slots <= 2; slots++)
-                    for (forms = 0; forms < 2; forms++) {
-                        s->form = forms == 0 ? &jl_kf_joseph
-                                             : &jl_kf_standard;
+                    for (f = 0; f < PAR_FORMS; f++) {
+                        s->form = par_forms[f];
                         compare(&run, slots);
                     }
 }
