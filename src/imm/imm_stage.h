@@ -21,6 +21,7 @@ enum { JLI_ACCEPTED = 0, JLI_MISSING = 1, JLI_REJECTED = 2 };
 #if JL_REAL_FLOAT
 #define jli_log_sum_exp jli_log_sum_exp_f32
 #define jli_imm_update jli_imm_update_f32
+#define jli_check_sizes jli_check_sizes_f32
 #define jli_own_states jli_own_states_f32
 #define jli_all_states jli_all_states_f32
 #endif
@@ -33,10 +34,17 @@ jl_real jli_log_sum_exp(jl_real *v, int n, jl_real *sum);
 int jli_imm_update(jl_imm *imm, int j, const jl_real *z, jl_real gate,
                    jl_real *scratch);
 
-/* --- modes of different states (imm_sizes.c); only where there are maps ---- */
+/* --- modes of different states (imm_sizes.c) ------------------------------ */
 
-/* What mode j has of the n components of (x, P), into (own_x, own_P); and all n
- * again, with the prior of those that it lacks.  scratch [n] */
+#define JLI_LACKS(imm, j) ((imm)->modes[j].n < (imm)->n)
+
+/* What jl_imm_init_sizes is given: JL_OK, JL_EDIM, or a prior's code. */
+int jli_check_sizes(int M, int n, const jl_mode *modes,
+                    const int *const *map, const jl_real *prior_x,
+                    const jl_real *prior_var, const jl_kf_form *form);
+
+/* Of a mode that lacks components: what it has of (x, P), into (own_x, own_P),
+ * scratch [n]; and all n again, with the prior of what it lacks. */
 void jli_own_states(jl_real *own_x, jl_real *own_P, const jl_imm *imm, int j,
                     const jl_real *x, const jl_real *P, jl_real *scratch);
 void jli_all_states(jl_real *x, jl_real *P, const jl_imm *imm, int j,

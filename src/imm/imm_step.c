@@ -20,7 +20,7 @@ static struct place own(const jl_imm *imm, int j, jl_real *scratch)
     p.rest = p.new_P + k * k;
     p.x = imm->xw + j * n;
     p.P = imm->Pw + j * n * n;
-    if (imm->map != NULL) {
+    if (JLI_LACKS(imm, j)) {
         jl_real *x = p.rest, *P = x + k;
 
         jli_own_states(x, P, imm, j, p.x, p.P, P + k * k);
@@ -36,7 +36,7 @@ static void put_back(jl_imm *imm, int j, const struct place *p)
     int n = imm->n;
     jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
 
-    if (imm->map != NULL) {
+    if (JLI_LACKS(imm, j)) {
         jli_all_states(x, P, imm, j, p->new_x, p->new_P);
     } else {
         jli_copy(x, p->new_x, n);
