@@ -768,6 +768,10 @@ static void test_sizes_init_refuses_maps(void **state)
     assert_int_equal(init_status(N, none, &jl_kf_joseph, cap), JL_EDIM);
     assert_int_equal(init_status(N - 1, map, &jl_kf_joseph, cap), JL_EDIM);
     assert_int_equal(init_status(0, map, &jl_kf_joseph, cap), JL_EDIM);
+    assert_int_equal(jl_imm_init_sizes(&rig.imm, 2, 4, rig.modes, map, prior_x,
+                                       prior_var, &jl_kf_joseph, JL_MIX_AUTO,
+                                       rig.mem + EDGE, cap), JL_EDIM);
+    assert_same_bits(&rig, &before, sizeof rig);        /* n below mode 1's */
     assert_int_equal(init_status(JL_MAX_STATES + 1, map, &jl_kf_joseph,
                                  INT_MAX), JL_EDIM);
     assert_int_equal(init_status(N, map, &jl_kf_joseph, cap - 1), JL_ENOMEM);
