@@ -62,8 +62,8 @@ typedef struct jl_imm {
     int sticky;                 /* Pi = diag(lambda) + 1 v' is used         */
     int stage;                  /* what may come next; see the calls        */
     int combined;               /* xhat, Phat belong to the present state   */
-    int verdict;                /* on the measurement of the step under way:
-                                   accepted, missing, rejected (imm_stage.h) */
+    int verdict;                /* on the z of the step under way, or of the
+                                   last: JL_ACCEPTED, JL_MISSING, JL_REJECTED */
 
     /* of modes that lack components (jl_imm_init_sizes) */
     const int *const *map;      /* [M][modes[j].n]                          */
@@ -73,7 +73,7 @@ typedef struct jl_imm {
     /* gate */
     jl_real gate;               /* a mode rejects above this nis; 0: no gate */
     int most;                   /* rejections in a row; then accept         */
-    int run;                    /* ... so many by now; 0: the last counted  */
+    int run;                    /* ... so many since the last accepted      */
     unsigned long rejected;     /* all since set                            */
 
     /* the state: valid between steps */
@@ -91,13 +91,13 @@ typedef struct jl_imm {
     unsigned long accepted;     /* ... so many                              */
 
     /* the step under way: mixed, then predicted, then updated */
-    jl_real *xw;                /* [M,n]                                    */
+    jl_real *xw;                /* [M,n] with a gate, of modes that reject,
+                                   predicted only until judge               */
     jl_real *Pw;                /* [M,n,n]                                  */
     jl_real *logc;              /* [M] predicted log-probabilities          */
     jl_real *c;                 /* [M] exp(logc)                            */
     jl_real *l;                 /* [M] log-likelihoods                      */
-    jl_real *nis;               /* [M] nu' S^-1 nu; above the gate: xw, Pw are
-                                   predicted only, until judge              */
+    jl_real *nis;               /* [M] nu' S^-1 nu; 0 without z             */
     jl_real *nu;                /* [M,m] innovations                        */
     jl_real *e;                 /* [M] work                                 */
     jl_real *d;                 /* [2n] work                                */
@@ -151,9 +151,10 @@ int jl_imm_init_sizes(jl_imm *imm, int M, int n, const jl_mode *modes,
                       int mixing, jl_real *mem, int cap);
 
 /* Gate: as jl_kf_gate, for a measurement whose nis is above `nis` in every mode
- * that is possible: the modes are then only predicted, as if it were missing.
- * (A gate of each mode by itself would be wrong: the mode that rejects avoids a
- * bad likelihood, and wins.)
+ * that is possible: then the modes are only predicted, and mu becomes c.  One
+ * that a mode accepts is used by all: the bits are those without a gate.  (If
+ * each mode had a gate by itself, one that rejects would avoid a bad
+ * likelihood, and win.)  Ends a step under way.
  * Returns JL_OK, or JL_ERANGE (nis not finite or below 0, most below 0). */
 int jl_imm_gate(jl_imm *imm, jl_real nis, int most);
 
@@ -174,7 +175,8 @@ int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,
                const jl_real *mu, jl_real *scratch);
 
 /* One step: mix, filter, weigh, combine.  z [m], or NULL for a missing
- * measurement: the modes are only predicted, log mu = log c, loglik = 0.
+ * measurement: the modes are only predicted, log mu = log c, loglik = 0; the
+ * same with one that the gate rejects.
  * Returns JL_OK, or the code of the first mode that failed: JL_ENONFINITE,
  * JL_ESINGULAR; the filter is then as before the step. */
 int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch);
@@ -183,7 +185,8 @@ int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch);
  * time and starts the step anew; combine combines the present state and may be
  * called at any time.
  * Returns: as jl_imm_step, and JL_EORDER for filter without mix, or weigh
- * without filter or after a failure.  chain and set end a step under way. */
+ * without filter or after a failure.  chain, set and gate end a step under
+ * way. */
 int jl_imm_mix(jl_imm *imm, jl_real *scratch);
 int jl_imm_filter(jl_imm *imm, const jl_real *z, jl_real *scratch);
 int jl_imm_weigh(jl_imm *imm);
@@ -192,14 +195,17 @@ void jl_imm_combine(jl_imm *imm);
 /* The pieces of mix and filter, for filters spread over several processors:
  * mix = foresee, then mix_mode for every j; filter = predict_mode and
  * update_mode for every j, then judge.  A processor does so for the modes it
- * owns; l[j], nis[j], xw[j], Pw[j] of the others come to it by message; then, if
- * no mode has failed anywhere, it calls judge and weigh.  (It must own a mode:
- * update_mode opens judge and weigh.)
+ * owns; l[j], nis[j], xw[j], Pw[j] of the others come to it by message; then,
+ * if no mode has failed anywhere, it calls judge and weigh.  (It must own a
+ * mode: update_mode opens judge and weigh.)
  * 0 <= j < M; scratch as above.  foresee computes c of all modes from mu of all
  * modes; mix_mode, predict_mode and update_mode leave their result in xw[j],
- * Pw[j], and l[j], nis[j], nu[j].  A mode above the gate stays as predicted;
- * judge, when the measurement is accepted in spite of it, updates it: so every
- * processor does the same for all modes, whoever owns them. */
+ * Pw[j], and l[j], nis[j], nu[j].  With a gate, a mode that rejects, and one
+ * that is impossible (c_j = 0) and has no say, stays as predicted; judge, when
+ * the measurement is accepted, updates it: so every processor does the same for
+ * all modes, whoever owns them.  (Of nis[j] of the others, judge only asks
+ * whether it is above the gate.)
+ * judge returns JL_OK, JL_EORDER, or the code of an update that fails. */
 void jl_imm_foresee(jl_imm *imm);
 void jl_imm_mix_mode(jl_imm *imm, int j, jl_real *scratch);
 int jl_imm_predict_mode(jl_imm *imm, int j, jl_real *scratch);

@@ -63,6 +63,7 @@ static void forget(jl_imm *imm)
     imm->accepted = 0;
     imm->rejected = 0;
     imm->run = 0;
+    imm->verdict = JL_MISSING;
     imm->loglik = 0;
     imm->stage = JLI_IDLE;
 }

@@ -10,9 +10,6 @@ enum {
     JLI_FAILED = 4
 };
 
-/* The verdict on a measurement. */
-enum { JLI_ACCEPTED = 0, JLI_MISSING = 1, JLI_REJECTED = 2 };
-
 /* Probabilities above this are summed as they are: terms of such a sum that
  * have underflowed are below eps^2 of it.  Sums below it, zero included, are
  * formed from logarithms. */
@@ -21,6 +18,7 @@ enum { JLI_ACCEPTED = 0, JLI_MISSING = 1, JLI_REJECTED = 2 };
 #if JL_REAL_FLOAT
 #define jli_log_sum_exp jli_log_sum_exp_f32
 #define jli_imm_update jli_imm_update_f32
+#define jli_imm_waits jli_imm_waits_f32
 #define jli_check_sizes jli_check_sizes_f32
 #define jli_own_states jli_own_states_f32
 #define jli_all_states jli_all_states_f32
@@ -30,9 +28,13 @@ enum { JLI_ACCEPTED = 0, JLI_MISSING = 1, JLI_REJECTED = 2 };
  * exp(v - max), *sum is the sum of those. */
 jl_real jli_log_sum_exp(jl_real *v, int n, jl_real *sum);
 
-/* Update mode j in xw, Pw, unless its nis is above the gate (0: none). */
+/* Update mode j in xw, Pw; with a gate, unless it waits for the verdict. */
 int jli_imm_update(jl_imm *imm, int j, const jl_real *z, jl_real gate,
                    jl_real *scratch);
+
+/* 1 if mode j is updated only when all know that the measurement is accepted:
+ * it is outside its gate; or the mode is impossible, and has no say. */
+int jli_imm_waits(const jl_imm *imm, int j);
 
 /* --- modes of different states (imm_sizes.c) ------------------------------ */
 

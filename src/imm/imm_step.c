@@ -1,6 +1,7 @@
 /* Stages 2 and 3, and the four in one. */
 #include "imm/imm_stage.h"
 
+#include "kf/kf_gate.h"
 #include "mat/mat_k.h"
 
 /* Where a mode's own estimate is, and where what becomes of it goes first. */
@@ -67,15 +68,15 @@ int jli_imm_update(jl_imm *imm, int j, const jl_real *z, jl_real gate,
     int status;
 
     got.nu = imm->nu + j * imm->m;
-    status = imm->form->update(p.new_x, p.new_P, &got, &imm->modes[j], p.x,
-                               p.P, z, p.rest);
+    status = jli_gated_update(p.new_x, p.new_P, &got, imm->form,
+                              &imm->modes[j], p.x, p.P, z, gate, p.rest);
     if (status != JL_OK) {
         imm->stage = JLI_FAILED;
         return status;
     }
     imm->l[j] = got.loglik;
     imm->nis[j] = got.nis;
-    if (!(gate > 0 && got.nis > gate))
+    if (!(gate > 0 && jli_imm_waits(imm, j)))
         put_back(imm, j, &p);
     return JL_OK;
 }
@@ -88,6 +89,7 @@ int jl_imm_update_mode(jl_imm *imm, int j, const jl_real *z,
         imm->stage = JLI_FILTERED;
     if (z == NULL) {
         imm->l[j] = 0;
+        imm->nis[j] = 0;
         return JL_OK;
     }
     return jli_imm_update(imm, j, z, imm->gate, scratch);
@@ -133,10 +135,10 @@ static void count(jl_imm *imm)
 {
     int j;
 
-    if (imm->verdict == JLI_REJECTED) {
+    if (imm->verdict == JL_REJECTED) {
         imm->run++;
         imm->rejected++;
-    } else if (imm->verdict == JLI_ACCEPTED) {
+    } else if (imm->verdict == JL_ACCEPTED) {
         imm->run = 0;
         imm->accepted++;
         for (j = 0; j < imm->M; j++)
@@ -162,7 +164,7 @@ int jl_imm_weigh(jl_imm *imm)
         imm->logmu[j] -= lse;
         imm->mu[j] = e[j] / sum;
     }
-    imm->loglik = imm->verdict == JLI_ACCEPTED ? best + lse : 0;
+    imm->loglik = imm->verdict == JL_ACCEPTED ? best + lse : 0;
     count(imm);
     swap(&imm->x, &imm->xw);
     swap(&imm->P, &imm->Pw);
