@@ -131,16 +131,17 @@ static jl_real best_likelihood(const jl_imm *imm)
     return best;
 }
 
+/* As in kf.c, counts stay where they are as large as can be. */
 static void count(jl_imm *imm)
 {
     int j;
 
     if (imm->verdict == JL_REJECTED) {
-        imm->run++;
+        imm->run += imm->run < INT_MAX;
         imm->rejected++;
     } else if (imm->verdict == JL_ACCEPTED) {
         imm->run = 0;
-        imm->accepted++;
+        imm->accepted += imm->accepted < ULONG_MAX;
         for (j = 0; j < imm->M; j++)
             imm->nis_mean[j] += (imm->nis[j] - imm->nis_mean[j])
                 / (jl_real)imm->accepted;
