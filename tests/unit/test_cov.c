@@ -1,27 +1,20 @@
-/* How forms keep covariances: the sums over estimates against long double, in
- * any of the ways that a table allows. */
+/* How forms keep covariances, and what an IMM does with them: the covariance
+ * itself and the factor, against sums in long double. */
 #include "close.h"
 
 #include <stdint.h>
 
 #include "jumplink/kf.h"
 
-#define MAX JL_MAX_STATES
+#define N 7
+#define M_MAX 6
+#define EDGE 3
 #define EPS ((double)JL_EPSILON)
-#define NAN_ ((jl_real)NAN)
-#define EDGE 4
-
-enum { MODES = 7 };
 
 typedef long double wide;
 
-static const jl_cov *const covs[] = { &jl_cov_full };
-#define COVS ((int)(sizeof covs / sizeof covs[0]))
-
-static const int sizes[] = { 1, 2, 3, 4, 6, 9, MAX };
-#define SIZES ((int)(sizeof sizes / sizeof sizes[0]))
-
-static uint32_t seed = 3;
+static const jl_cov *const covs[] = { &jl_cov_full, &jl_cov_ud };
+static uint32_t seed = 5;
 
 /* Uniform in [-1, 1). */
 static jl_real rnd(void)
@@ -30,366 +23,420 @@ static jl_real rnd(void)
     return (jl_real)(seed >> 8) / 8388608 - 1;
 }
 
-/* A = B B' / n + c I */
-static void make_cov(jl_real *A, int n, jl_real c)
+static void spoil(jl_real *a, int count)
 {
-    static jl_real B[MAX * MAX];
+    while (count-- > 0)
+        *a++ = (jl_real)NAN;
+}
+
+/* --- estimates ----------------------------------------------------------- */
+
+/* M estimates of n components, and what comes of them, with NaN around. */
+static jl_real x[M_MAX * N], P[M_MAX * N * N], S[M_MAX * N * N], w[M_MAX];
+static jl_real mean[N], out[N * N + 2 * EDGE], scratch[N * N + 2 * N + EDGE];
+static const jl_cov *cov;
+
+/* Scratch of so many reals. */
+static jl_real *room(int count)
+{
+    spoil(scratch, N * N + 2 * N + EDGE);
+    scratch[count] = 77;
+    return scratch;
+}
+
+static void check_room(int count)
+{
+    assert_true(scratch[count] == 77);
+}
+
+/* A = B B', B [n,rank], in units of 10^+-decades */
+static void make_cov(jl_real *A, int n, int rank, int decades)
+{
+    jl_real B[N * N];
     int i, j, k;
 
-    for (i = 0; i < n * n; i++)
-        B[i] = rnd();
     for (i = 0; i < n; i++)
-        for (j = i; j < n; j++) {
-            A[i * n + j] = i == j ? c : 0;
-            for (k = 0; k < n; k++)
-                A[i * n + j] += B[i * n + k] * B[j * n + k] / (jl_real)n;
-            A[j * n + i] = A[i * n + j];
+        for (k = 0; k < rank; k++)
+            B[i * rank + k] = rnd()
+                * (jl_real)pow(10, i * 5 % (2 * decades + 1) - decades);
+    for (i = 0; i < n; i++)
+        for (j = 0; j < n; j++) {
+            A[i * n + j] = 0;
+            for (k = 0; k < rank; k++)
+                A[i * n + j] += B[i * rank + k] * B[j * rank + k];
         }
 }
 
-/* --- scratch and results with NaN around them ------------------------------ */
-
-static jl_real scratch[MAX * MAX + 2 * MAX + 2 * EDGE];
-static jl_real out_x[MAX + 2 * EDGE], out_S[MAX * MAX + 2 * EDGE];
-static jl_real *const mean = out_x + EDGE, *const S = out_S + EDGE;
-
-static jl_real *spoilt(int count)
+/* Estimates of several ranks, some with a component that is known exactly;
+ * weights of which some are small or 0. */
+static void make(int M, int n, int decades)
 {
-    int i;
+    jl_real sum = 0;
+    int i, a, known;
 
-    for (i = 0; i < count + 2 * EDGE; i++)
-        scratch[i] = NAN_;
-    for (i = 0; i < MAX + 2 * EDGE; i++)
-        out_x[i] = NAN_;
-    for (i = 0; i < MAX * MAX + 2 * EDGE; i++)
-        out_S[i] = NAN_;
-    return scratch + EDGE;
+    for (i = 0; i < M; i++) {
+        make_cov(P + i * n * n, n, 1 + (int)(seed % (unsigned)n), decades);
+        known = (int)(seed % (unsigned)(2 * n));
+        for (a = 0; a < n && known < n; a++)
+            P[i * n * n + a * n + known] = P[i * n * n + known * n + a] = 0;
+        for (a = 0; a < n; a++)
+            x[i * n + a] = 4 * rnd() * (jl_real)pow(10, a * 5
+                                                % (2 * decades + 1) - decades);
+        w[i] = 1 + rnd();
+        if (i > 0 && seed % 4 == 0)
+            w[i] *= seed % 8 ? JL_C(1.0e-9) : 0;
+        sum += w[i];
+        cov->take(S + i * n * n, P + i * n * n, room(n * n + 2 * n), n);
+        check_room(n * n + 2 * n);
+    }
+    for (i = 0; i < M; i++)
+        w[i] /= sum;
 }
 
-/* n: of the results. */
-static void check_edges(int count, int n)
+/* Element (i, j) of what S stands for. */
+static wide element(const jl_real *s, int n, int i, int j)
 {
-    int i;
+    wide sum = 0;
+    int k;
 
-    for (i = 0; i < EDGE; i++) {
-        assert_true(isnan(scratch[i]) && isnan(scratch[EDGE + count + i]));
-        assert_true(isnan(out_x[i]) && isnan(out_x[EDGE + n + i]));
-        assert_true(isnan(out_S[i]) && isnan(out_S[EDGE + n * n + i]));
+    if (!cov->factored)
+        return s[i * n + j];
+    for (k = 0; k <= i && k <= j; k++)
+        sum += (wide)s[k * n + k] * (k == i ? 1 : s[k * n + i])
+            * (k == j ? 1 : s[k * n + j]);
+    return sum;
+}
+
+/* Symmetric; or D >= 0 and zeros below. */
+static void check_kept(const jl_real *s, int n)
+{
+    int i, j;
+
+    assert_true(jl_vec_within(s, n * n, JL_REAL_MAX));
+    for (i = 0; i < n; i++) {
+        assert_true(s[i * (n + 1)] >= 0);
+        for (j = 0; j < i; j++)
+            assert_true(s[i * n + j] == (cov->factored ? 0 : s[j * n + i]));
     }
 }
 
-/* What S stands for is the covariance want, exactly symmetric; of a factor, the
- * lower half is zero. */
-static void check_cov(const jl_cov *cov, const jl_real *kept,
-                      const wide *want, int n, double tolerance)
+/* s stands for `want` [n,n], in units of its sigma_i sigma_j. */
+static void check_cov(const jl_real *s, wide (*want)[N], int n,
+                      double tolerance)
 {
-    static jl_real P[MAX * MAX];
     int i, j;
 
-    cov->give(P, kept, n);
+    check_kept(s, n);
     for (i = 0; i < n; i++)
-        for (j = 0; j < n; j++) {
-            assert_close(P[i * n + j], want[i * n + j], tolerance);
-            assert_same_bits(&P[i * n + j], &P[j * n + i], sizeof *P);
-            assert_true(!cov->factored || j >= i || kept[i * n + j] == 0);
-        }
+        for (j = i; j < n; j++)
+            assert_close(element(s, n, i, j) - want[i][j], 0,
+                         tolerance * (double)(sqrtl(want[i][i])
+                                              * sqrtl(want[j][j])));
 }
 
-/* --- take, give ------------------------------------------------------------ */
+/* --- there and back ------------------------------------------------------ */
 
 static void test_cov_take_and_give(void **state)
 {
-    static jl_real P[MAX * MAX];
-    static wide want[MAX * MAX];
-    int c, s, n, i;
+    jl_real back[N * N], again[N * N];
+    int run, n, i, j;
 
     (void)state;
-    for (c = 0; c < COVS; c++)
-        for (s = 0; s < SIZES; s++) {
-            n = sizes[s];
-            make_cov(P, n, JL_C(0.1));
-            for (i = 0; i < n * n; i++)
-                want[i] = P[i];
-            covs[c]->take(S, P, spoilt(n * n + 2 * n), n);
-            for (i = 0; i < n; i++)
-                mean[i] = 0;
-            check_edges(n * n + 2 * n, n);
-            check_cov(covs[c], S, want, n, 16 * n * EPS);
-            memcpy(S, P, (size_t)(n * n) * sizeof *P);  /* in place */
-            covs[c]->take(S, S, scratch + EDGE, n);
-            check_cov(covs[c], S, want, n, 16 * n * EPS);
-            if (n > 1)                  /* as symmetric as a set allows */
-                S[n] *= 1 + 8 * JL_EPSILON;
-            if (!covs[c]->factored) {
-                covs[c]->take(S, S, scratch + EDGE, n);
-                check_cov(covs[c], S, want, n, 16 * n * EPS);
+    for (run = 0; run < 4000; run++) {
+        cov = covs[run % 2];
+        n = 1 + run / 2 % N;
+        make(1, n, run % 3 ? 12 : 0);
+        P[n > 1 ? n : 0] *= 1 + 4 * JL_EPSILON;     /* as good as symmetric */
+        cov->take(S, P, room(n * n + 2 * n), n);
+        check_room(n * n + 2 * n);
+        check_kept(S, n);
+        cov->give(back, S, n);
+        for (i = 0; i < n; i++)
+            for (j = i; j < n; j++) {
+                double scale = sqrt((double)P[i * (n + 1)])
+                    * sqrt((double)P[j * (n + 1)]);
+
+                assert_same_bits(&back[i * n + j], &back[j * n + i],
+                                 sizeof *back);
+                assert_close(back[i * n + j], P[i * n + j],
+                             cov->factored ? 128 * n * EPS * scale : 0);
+                assert_close(back[i * n + j], element(S, n, i, j),
+                             4 * n * EPS * scale);
             }
-        }
-}
-
-/* --- pool ------------------------------------------------------------------- */
-
-static struct {
-    jl_real w[MODES], x[MODES * MAX], P[MODES * MAX * MAX];
-    jl_real S[MODES * MAX * MAX];       /* P as a form keeps it */
-} in;
-
-static struct { wide mean[MAX], P[MAX * MAX]; } book;
-
-static void make(const jl_cov *cov, int M, int n, jl_real apart)
-{
-    jl_real total = 0;
-    int i;
-
-    for (i = 0; i < M; i++)
-        total += in.w[i] = JL_C(1.1) + rnd();
-    for (i = 0; i < M; i++) {
-        in.w[i] /= total;
-        make_cov(in.P + i * n * n, n, JL_C(0.1));
-        cov->take(in.S + i * n * n, in.P + i * n * n, scratch, n);
+        memcpy(again, P, sizeof again);
+        cov->take(again, again, room(n * n + 2 * n), n);
+        assert_same_bits(again, S, (size_t)(n * n) * sizeof *S);
     }
-    for (i = 0; i < M * n; i++)
-        in.x[i] = apart * rnd();
 }
 
-static void book_pool(int M, int n)
+/* --- sums over estimates -------------------------------------------------- */
+
+static void pooled(wide *m, wide (*want)[N], int M, int n)
 {
+    wide sum = 0;
     int i, a, b;
 
-    memset(&book, 0, sizeof book);
     for (i = 0; i < M; i++)
-        for (a = 0; a < n; a++)
-            book.mean[a] += (wide)in.w[i] * in.x[i * n + a];
-    for (i = 0; i < M; i++)
-        for (a = 0; a < n; a++)
-            for (b = 0; b < n; b++)
-                book.P[a * n + b] += in.w[i]
-                    * (in.P[(i * n + a) * n + b]
-                       + (in.x[i * n + a] - book.mean[a])
-                       * (in.x[i * n + b] - book.mean[b]));
-}
-
-static void check_pool(const jl_cov *cov, int M, int n, double size)
-{
-    int a;
-
+        sum += w[i];
     for (a = 0; a < n; a++)
-        assert_close(mean[a], book.mean[a], 8 * M * size * EPS);
-    check_cov(cov, S, book.P, n, 32 * (M + n) * (1 + size * size) * EPS);
-}
-
-static void pool(const jl_cov *cov, int M, int n, double size)
-{
-    book_pool(M, n);
-    cov->pool(mean, S, in.w, in.x, in.S, spoilt(2 * n), M, n);
-    check_edges(2 * n, n);
-    check_pool(cov, M, n, size);
+        for (m[a] = 0, i = 0; i < M; i++)
+            m[a] += w[i] * (wide)x[i * n + a] / sum;
+    for (a = 0; a < n; a++)
+        for (b = 0; b < n; b++)
+            for (want[a][b] = 0, i = 0; i < M; i++)
+                want[a][b] += w[i] / sum
+                    * (element(S + i * n * n, n, a, b)
+                       + (x[i * n + a] - m[a]) * (x[i * n + b] - m[b]));
 }
 
 static void test_cov_pool(void **state)
 {
-    int c, s, M;
+    wide m[N], want[N][N];
+    int run, n, M, i, decades;
 
     (void)state;
-    for (c = 0; c < COVS; c++)
-        for (s = 0; s < SIZES; s++)
-            for (M = 1; M <= MODES; M += 1 + (sizes[s] == MAX)) {
-                make(covs[c], M, sizes[s], 3);
-                pool(covs[c], M, sizes[s], 3);
-                make(covs[c], M, sizes[s], 1000);
-                pool(covs[c], M, sizes[s], 1000);
-            }
+    for (run = 0; run < 6000; run++) {
+        cov = covs[run % 2];
+        M = 1 + run / 2 % M_MAX;
+        n = 1 + run / 3 % N;
+        decades = run % 5 ? 0 : 12;
+        make(M, n, decades);
+        spoil(out, N * N + 2 * EDGE);
+        spoil(mean, N);
+        cov->pool(mean, out + EDGE, w, x, S, room(2 * n), M, n);
+        check_room(2 * n);
+        assert_true(isnan(out[EDGE - 1]) && isnan(out[EDGE + n * n]));
+        pooled(m, want, M, n);
+        for (i = 0; i < n; i++)
+            assert_close(mean[i], m[i], 8 * M * EPS
+                         * (double)sqrtl(want[i][i] + m[i] * m[i]));
+        check_cov(out + EDGE, want, n, 16 * (M + n) * EPS);
+    }
 }
 
-/* Weights of 0 and 1: one estimate, to the last digits. */
-static void test_cov_pool_of_one(void **state)
+static void test_cov_blend_is_a_pool_of_two(void **state)
 {
-    int c, k, i;
+    wide m[N], want[N][N];
+    jl_real bx[N], bS[N * N];
+    int run, n, i, nn;
 
     (void)state;
-    for (c = 0; c < COVS; c++)
-        for (k = 0; k < MODES; k++) {
-            make(covs[c], MODES, 4, 1000);
-            for (i = 0; i < MODES; i++)
-                in.w[i] = i == k;
-            book_pool(MODES, 4);
-            covs[c]->pool(mean, S, in.w, in.x, in.S, spoilt(2 * 4), MODES, 4);
-            assert_same_bits(mean, in.x + k * 4, 4 * sizeof *mean);
-            check_cov(covs[c], S, book.P, 4, 16 * EPS);
+    for (run = 0; run < 4000; run++) {
+        cov = covs[run % 2];
+        n = 1 + run / 2 % N;
+        nn = n * n;
+        make(2, n, run % 5 ? 0 : 12);
+        if (run % 7 == 0) {
+            w[run % 2] = 0;
+            w[1 - run % 2] = 1;
         }
+        spoil(bS, N * N);
+        cov->blend(bx, bS, w[0], x, S, w[1], x + n, S + nn, room(2 * n), n);
+        check_room(2 * n);
+        pooled(m, want, 2, n);
+        for (i = 0; i < n; i++)
+            assert_close(bx[i], m[i], 8 * EPS
+                         * (double)sqrtl(want[i][i] + m[i] * m[i]));
+        check_cov(bS, want, n, 32 * (1 + n) * EPS);
+        cov->blend(x, S, w[0], x, S, w[1], x + n, S + nn, room(2 * n), n);
+        assert_same_bits(x, bx, (size_t)n * sizeof *x);
+        assert_same_bits(S, bS, (size_t)nn * sizeof *S);
+    }
 }
 
-/* Agreement is no spread. */
-static void test_cov_pool_of_those_that_agree(void **state)
+/* What both agree in stays, to the bit. */
+static void test_cov_blend_of_two_that_agree(void **state)
 {
-    int c, i;
+    int run, n;
 
     (void)state;
-    for (c = 0; c < COVS; c++) {
-        make(covs[c], MODES, 4, 0);
-        for (i = 0; i < MODES * 4; i++)
-            in.x[i] = 8;
-        for (i = 0; i < MODES; i++)
-            memcpy(in.P + i * 16, in.P, 16 * sizeof *in.P);
-        for (i = 1; i < MODES; i++)
-            memcpy(in.S + i * 16, in.S, 16 * sizeof *in.S);
-        pool(covs[c], MODES, 4, 8);
-        for (i = 0; i < 16; i++)
-            assert_close(book.P[i], in.P[i], 16 * EPS);
+    for (run = 0; run < 400; run++) {
+        cov = covs[run % 2];
+        n = 1 + run / 2 % N;
+        make(2, n, run % 5 ? 0 : 12);
+        memcpy(x + n, x, (size_t)n * sizeof *x);
+        cov->blend(mean, out, w[0], x, S, w[1], x + n, S + n * n, room(2 * n),
+                   n);
+        assert_same_bits(mean, x, (size_t)n * sizeof *x);
     }
 }
 
 /* Far from zero, near each other: the spread keeps its digits. */
 static void test_cov_pool_far_from_zero(void **state)
 {
-    int c, i;
+    wide m[N], want[N][N];
+    int run, n, i;
 
     (void)state;
-    for (c = 0; c < COVS; c++) {
-        make(covs[c], MODES, 4, 1);
-        for (i = 0; i < MODES * 4; i++)
-            in.x[i] += 1000;
-        book_pool(MODES, 4);
-        covs[c]->pool(mean, S, in.w, in.x, in.S, spoilt(2 * 4), MODES, 4);
-        check_cov(covs[c], S, book.P, 4, 64 * 1000 * EPS);
+    for (run = 0; run < 400; run++) {
+        cov = covs[run % 2];
+        n = 1 + run / 2 % N;
+        make(M_MAX, n, 0);
+        for (i = 0; i < M_MAX * n; i++)
+            x[i] += 1000;
+        cov->pool(mean, out, w, x, S, room(2 * n), M_MAX, n);
+        pooled(m, want, M_MAX, n);
+        check_cov(out, want, n, 64 * 1000 * EPS);
     }
 }
 
-/* --- blend ------------------------------------------------------------------- */
-
-/* a of the first estimate and 1 - a of the second, apart and in place. */
-static void check_blend(const jl_cov *cov, jl_real a, int n, jl_real apart)
+/* Estimates as far apart, and variances as large, as they may be. */
+static void test_cov_sums_cannot_overflow(void **state)
 {
-    static jl_real same[MAX * MAX];
-
-    make(cov, 2, n, apart);
-    in.w[0] = a;
-    in.w[1] = 1 - a;
-    book_pool(2, n);
-    cov->blend(mean, S, in.w[0], in.x, in.S, in.w[1], in.x + n, in.S + n * n,
-               spoilt(2 * n), n);
-    check_edges(2 * n, n);
-    check_pool(cov, 2, n, (double)apart);
-    memcpy(same, S, (size_t)(n * n) * sizeof *same);
-    cov->blend(in.x, in.S, in.w[0], in.x, in.S, in.w[1], in.x + n,
-               in.S + n * n, scratch + EDGE, n);
-    assert_same_bits(in.x, mean, (size_t)n * sizeof *mean);
-    assert_same_bits(in.S, same, (size_t)(n * n) * sizeof *same);
-}
-
-static void test_cov_blend_is_the_pool_of_two(void **state)
-{
-    int c, s, k;
+    int c, n, i, k;
 
     (void)state;
-    for (c = 0; c < COVS; c++)
-        for (s = 0; s < SIZES; s++)
-            for (k = 0; k <= 8; k++) {
-                check_blend(covs[c], (jl_real)k / 8, sizes[s], 3);
-                check_blend(covs[c], (jl_real)k / 8, sizes[s], 1000);
+    for (c = 0; c < 2; c++)
+        for (n = 1; n <= 2; n++)
+            for (k = 0; k < 4; k++) {
+                cov = covs[c];
+                make(M_MAX, n, 0);
+                for (i = 0; i < M_MAX * n; i++) {
+                    x[i] = i / n % 2 ? JL_LARGE : -JL_LARGE;
+                    w[i / n] = (jl_real)(1.0 / M_MAX);
+                }
+                w[0] = k % 2 ? JL_REAL_MIN : w[0];
+                for (i = 0; i < M_MAX; i++) {
+                    P[i * n * n] = JL_LARGE * JL_LARGE;
+                    if (n == 2) {       /* two as good as one, or nothing */
+                        P[i * n * n + 3] = k > 1 ? JL_REAL_MIN
+                            : JL_LARGE * JL_LARGE;
+                        P[i * n * n + 1] = P[i * n * n + 2]
+                            = (jl_real)sqrt((double)P[i * n * n + 3])
+                            * JL_LARGE;
+                    }
+                    cov->take(S + i * n * n, P + i * n * n,
+                              room(n * n + 2 * n), n);
+                }
+                cov->pool(mean, out, w, x, S, room(2 * n), M_MAX, n);
+                check_kept(out, n);
+                assert_true(jl_vec_within(mean, n, JL_LARGE));
+                cov->blend(mean, out, w[0], x, S, w[1], x + n, S + n * n,
+                           room(2 * n), n);
+                check_kept(out, n);
+                cov->give(P, out, n);
+                assert_true(jl_vec_within(P, n * n, JL_REAL_MAX));
             }
 }
 
-/* Nothing of an estimate without weight, however far away it is. */
-static void test_cov_blend_keeps_what_has_all_the_weight(void **state)
-{
-    int c, k;
+/* --- components ----------------------------------------------------------- */
 
-    (void)state;
-    for (c = 0; c < COVS; c++)
-        for (k = 0; k < 2; k++) {
-            make(covs[c], 2, 3, 1);
-            in.x[3 * k] = in.x[3 * k + 1] = in.x[3 * k + 2] = 1.0e15f;
-            covs[c]->blend(mean, S, (jl_real)k ? 1 : 0, in.x, in.S,
-                           (jl_real)k ? 0 : 1, in.x + 3, in.S + 9,
-                           spoilt(6), 3);
-            assert_same_bits(mean, in.x + 3 * (1 - k), 3 * sizeof *mean);
-            assert_true(covs[c]->factored
-                        || memcmp(S, in.S + 9 * (1 - k), 9 * sizeof *S) == 0);
-        }
-}
-
-/* What both agree in stays, to the bit. */
-static void test_cov_blend_of_two_that_agree(void **state)
-{
-    int c, k;
-
-    (void)state;
-    for (c = 0; c < COVS; c++)
-        for (k = 1; k < 100; k++) {
-            make(covs[c], 2, 4, 1000);
-            memcpy(in.x + 4, in.x, 4 * sizeof *in.x);
-            covs[c]->blend(mean, S, (jl_real)k / 100, in.x, in.S,
-                           1 - (jl_real)k / 100, in.x + 4, in.S + 16,
-                           spoilt(8), 4);
-            assert_same_bits(mean, in.x, 4 * sizeof *mean);
-        }
-}
-
-/* --- part, whole --------------------------------------------------------------- */
-
-/* Every subset of the n components, in order. */
-static int subset(int *map, unsigned bits, int n)
+/* A map of k out of n. */
+static int choose(int *map, int n)
 {
     int i, k = 0;
 
     for (i = 0; i < n; i++)
-        if (bits >> i & 1)
+        if (rnd() > 0)
             map[k++] = i;
+    if (k == 0)
+        map[k++] = n - 1;
     return k;
 }
 
-static void check_part(const jl_cov *cov, const int *map, int k, int n)
+static void test_cov_part(void **state)
 {
-    static jl_real var[MAX], kept[MAX * MAX], keep[MAX * MAX];
-    static wide want[MAX * MAX];
-    int i, j;
-
-    make(cov, 1, n, 1);
-    for (i = 0; i < k; i++)
-        for (j = 0; j < k; j++)
-            want[i * k + j] = in.P[map[i] * n + map[j]];
-    memcpy(keep, in.S, (size_t)(n * n) * sizeof *keep);
-    cov->part(S, in.S, map, spoilt(n), k, n);
-    for (i = 0; i < k; i++)
-        mean[i] = 0;
-    check_edges(n, k);
-    assert_same_bits(keep, in.S, (size_t)(n * n) * sizeof *keep);
-    check_cov(cov, S, want, k, 16 * n * EPS);
-
-    for (i = 0; i < n; i++)
-        var[i] = JL_C(1.5) + rnd();
-    memset(want, 0, sizeof want);
-    for (i = 0; i < n; i++)
-        want[i * (n + 1)] = var[i];
-    for (i = 0; i < k; i++)
-        for (j = 0; j < k; j++)
-            want[map[i] * n + map[j]] = in.P[map[i] * n + map[j]];
-    memcpy(kept, S, (size_t)(k * k) * sizeof *kept);
-    spoilt(n);
-    cov->whole(S, kept, map, var, k, n);
-    for (i = 0; i < n; i++)
-        mean[i] = 0;
-    check_edges(n, n);
-    check_cov(cov, S, want, n, 16 * n * EPS);
-}
-
-static void test_cov_part_and_whole(void **state)
-{
-    int map[MAX], c, n, k;
-    unsigned bits;
+    wide want[N][N];
+    int map[N], run, n, k, i, j;
 
     (void)state;
-    for (c = 0; c < COVS; c++) {
-        for (n = 1; n <= 6; n++)
-            for (bits = 1; bits < 1u << n; bits++) {
-                k = subset(map, bits, n);
-                check_part(covs[c], map, k, n);
-            }
-        for (k = 0; k < MAX / 2; k++)
-            map[k] = 2 * k + 1;
-        check_part(covs[c], map, MAX / 2, MAX);
+    for (run = 0; run < 4000; run++) {
+        cov = covs[run % 2];
+        n = 1 + run / 2 % N;
+        make(1, n, run % 5 ? 0 : 12);
+        k = choose(map, n);
+        for (i = 0; i < k; i++)
+            for (j = 0; j < k; j++)
+                want[i][j] = element(S, n, map[i], map[j]);
+        spoil(out, N * N + 2 * EDGE);
+        cov->part(out + EDGE, S, map, room(n), k, n);
+        check_room(n);
+        assert_true(isnan(out[EDGE - 1]) && isnan(out[EDGE + k * k]));
+        check_cov(out + EDGE, want, k, 8 * n * EPS);
     }
+}
+
+static void test_cov_whole(void **state)
+{
+    wide want[N][N];
+    jl_real var[N], small[N * N];
+    int map[N], run, n, k, i, j;
+
+    (void)state;
+    for (run = 0; run < 4000; run++) {
+        cov = covs[run % 2];
+        n = 1 + run / 2 % N;
+        k = choose(map, n);
+        make(1, k, run % 5 ? 0 : 12);
+        memset(want, 0, sizeof want);
+        for (i = 0; i < n; i++)
+            want[i][i] = var[i] = run % 3 ? 1 + rnd() : 0;
+        for (i = 0; i < k; i++)
+            for (j = 0; j < k; j++)
+                want[map[i]][map[j]] = element(S, k, i, j);
+        spoil(out, N * N + 2 * EDGE);
+        cov->whole(out + EDGE, S, map, var, k, n);
+        assert_true(isnan(out[EDGE - 1]) && isnan(out[EDGE + n * n]));
+        check_cov(out + EDGE, want, n, 0);
+        cov->part(small, out + EDGE, map, room(n), k, n);
+        for (i = 0; i < k; i++)         /* a row of weight 0 is not kept */
+            for (j = 0; j < k && S[i * (k + 1)] > 0; j++)
+                assert_same_bits(&small[i * k + j], &S[i * k + j], sizeof *S);
+    }
+}
+
+/* --- what only factors can do --------------------------------------------- */
+
+/* The determinant D_1 D_2 tells what a covariance cannot: a direction known to
+ * 1e-12 beside one of 1e12. */
+static void test_cov_factors_keep_what_is_small(void **state)
+{
+    const jl_real tiny = JL_C(1.0e-24), huge = JL_C(1.0e24);
+    const jl_real half = JL_C(0.5);
+    int k;
+
+    (void)state;
+    cov = &jl_cov_ud;
+    x[0] = x[1] = x[2] = x[3] = 1;
+    for (k = 0; k < 2; k++) {
+        /* tiny I and huge (1, 1)'(1, 1), in either order */
+        memset(S, 0, sizeof S);
+        S[4 * k] = S[4 * k + 3] = tiny;
+        S[4 * !k] = huge;
+        S[4 * !k + 1] = 1;
+        cov->blend(mean, out, half, x, S, half, x + 2, S + 4, room(4), 2);
+        check_kept(out, 2);
+        assert_close(out[0] / huge, 0.5, 4 * EPS);
+        assert_close(out[1], 1, 4 * EPS);
+        assert_close(out[3] / tiny, 1, 8 * EPS);        /* 1/2 + 1/2 */
+        w[0] = w[1] = half;
+        cov->pool(mean, out, w, x, S, room(4), 2, 2);
+        assert_close(out[3] / tiny, 1, 8 * EPS);
+    }
+}
+
+/* What is below JL_REAL_MIN is let go of before a quotient overflows. */
+static void test_cov_factors_stay_finite(void **state)
+{
+    const jl_real half = JL_C(0.5);
+    jl_real least = JL_REAL_MIN * JL_EPSILON;   /* the least above 0 */
+
+    (void)state;
+    cov = &jl_cov_ud;
+    memset(S, 0, sizeof S);
+    memset(x, 0, sizeof x);
+    x[0] = (jl_real)sqrt(16 * (double)JL_REAL_MIN) * (jl_real)sqrt(EPS);
+    x[1] = JL_LARGE;                    /* beside a difference of nearly none */
+    cov->blend(mean, out, half, x, S, half, x + 2, S + 4, room(4), 2);
+    check_kept(out, 2);
+    x[0] = JL_LARGE;                    /* over a row of so small a weight */
+    x[1] = 0;
+    S[0] = 8 * JL_LARGE * JL_LARGE * least;
+    S[1] = JL_LARGE / (jl_real)sqrt((double)S[0]);
+    cov->blend(mean, out, half, x, S, half, x + 2, S + 4, room(4), 2);
+    check_kept(out, 2);
+    cov->blend(mean, out, half, x, S + 4, half, x + 2, S, room(4), 2);
+    check_kept(out, 2);
 }
 
 int main(void)
@@ -397,13 +444,14 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cov_take_and_give),
         cmocka_unit_test(test_cov_pool),
-        cmocka_unit_test(test_cov_pool_of_one),
-        cmocka_unit_test(test_cov_pool_of_those_that_agree),
-        cmocka_unit_test(test_cov_pool_far_from_zero),
-        cmocka_unit_test(test_cov_blend_is_the_pool_of_two),
-        cmocka_unit_test(test_cov_blend_keeps_what_has_all_the_weight),
+        cmocka_unit_test(test_cov_blend_is_a_pool_of_two),
         cmocka_unit_test(test_cov_blend_of_two_that_agree),
-        cmocka_unit_test(test_cov_part_and_whole),
+        cmocka_unit_test(test_cov_pool_far_from_zero),
+        cmocka_unit_test(test_cov_sums_cannot_overflow),
+        cmocka_unit_test(test_cov_part),
+        cmocka_unit_test(test_cov_whole),
+        cmocka_unit_test(test_cov_factors_keep_what_is_small),
+        cmocka_unit_test(test_cov_factors_stay_finite),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
