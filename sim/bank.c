@@ -32,7 +32,7 @@ static int copy_modes(struct bank *bank)
     return 0;
 }
 
-static int open_imm(struct bank *bank, const jl_kf_form *form)
+static int open_imm(struct bank *bank, const struct options *options)
 {
     const struct model *model = bank->model;
     int M = model->M, n = model->n, m = model->m;
@@ -47,20 +47,22 @@ static int open_imm(struct bank *bank, const jl_kf_form *form)
         || bank->x == NULL || bank->P == NULL)
         return -1;
     return jl_imm_init_sizes(&bank->imm, M, n, bank->modes, model->map,
-                             model->prior_x, model->prior_var, form,
+                             model->prior_x, model->prior_var, options->form,
                              JL_MIX_AUTO, bank->mem, JL_IMM_STATE(M, n, m))
-        == JL_OK ? 0 : -1;
+            == JL_OK
+        && jl_imm_gate(&bank->imm, options_gate(options, m),
+                       options->gate_most) == JL_OK ? 0 : -1;
 }
 
 int bank_open(struct bank *bank, const struct model *model,
-              const jl_kf_form *form)
+              const struct options *options)
 {
     memset(bank, 0, sizeof *bank);
     bank->model = model;
     bank->dt = -1;
     if (model->M < 1)
         return -1;
-    if (copy_modes(bank) != 0 || open_imm(bank, form) != 0) {
+    if (copy_modes(bank) != 0 || open_imm(bank, options) != 0) {
         bank_close(bank);
         return -1;
     }

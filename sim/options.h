@@ -23,6 +23,9 @@ struct options {
     int kf;                     /* 0: imm, 1: kf of one mode                */
     int mode;                   /* ... this one; -1: the only one           */
     const jl_kf_form *form;
+    double gate;                /* a good measurement passes with this
+                                   probability; 0: no gate                  */
+    int gate_most;              /* rejections in a row; 0: not given        */
     enum hold hold;
     enum port port;             /* PORT_NONE: serial                        */
     int pes;
@@ -54,6 +57,8 @@ struct options {
     { "start", required_argument, NULL, 1012 }, \
     { "topology", required_argument, NULL, 1013 }, \
     { "exchange", required_argument, NULL, 1014 }, \
+    { "gate", required_argument, NULL, 1015 }, \
+    { "gate-most", required_argument, NULL, 1016 }, \
     { "out", required_argument, NULL, 'o' }, \
     { "help", no_argument, NULL, 'h' }
 
@@ -61,7 +66,11 @@ struct options {
     "  --filter imm|kf   all modes (default), or the Kalman filter of one\n" \
     "  --mode J          ... of this one, from 0 (default: the only one)\n" \
     "  --form joseph|standard  how covariances are updated (default\n" \
-    "                    joseph)\n"
+    "                    joseph)\n" \
+    "  --gate P          reject outliers, which no mode expects: a good\n" \
+    "                    measurement passes with probability P (0.9999)\n" \
+    "  --gate-most N     ... until N were rejected in a row; then it is the\n" \
+    "                    filter that is wrong (default 5)\n"
 #define MODEL_HELP \
     "The model is JSON.  Modes of the catalogue follow any time step; each\n" \
     "has an accel_std and a type: cv; ca (order 3); ct (axes 2), with a\n" \
@@ -106,6 +115,9 @@ const char *options_port_name(enum port port);
 
 void options_init(struct options *options, const char *command);
 
+/* The nis above which a measurement of m components is rejected; 0: never. */
+jl_real options_gate(const struct options *options, int m);
+
 /* The topology's name. */
 const char *options_topology(const struct options *options);
 
@@ -117,6 +129,10 @@ const char *options_topology(const struct options *options);
  * that getopt_long does not know is refused here.
  * Returns 0, or 2 (the exit status) after a message. */
 int options_take(struct options *options, int c, char *const *argv);
+
+/* When all are taken: what does not go together.  Returns 0, or 2 after a
+ * message. */
+int options_end(struct options *options);
 
 /* Take all options of a command that has only the common ones.
  * Returns -1: go on with argv from optind; or the exit status, after the help

@@ -29,7 +29,7 @@ int run_slots(const struct options *options)
 jl_u32 run_fingerprint(const struct model *model,
                        const struct options *options)
 {
-    unsigned char more[6];
+    unsigned char more[6 + 4 + JL_REAL_OCTETS];
 
     more[0] = (unsigned char)options->pes;
     more[1] = options->form == &jl_kf_joseph;
@@ -37,6 +37,8 @@ jl_u32 run_fingerprint(const struct model *model,
     more[3] = JL_REAL_OCTETS;
     more[4] = (unsigned char)options->topology;
     more[5] = (unsigned char)options->exchange;
+    jl_put_u32(more + 6, (jl_u32)options->gate_most);
+    jl_put_real(more + 10, options_gate(options, model->m));
     return jl_crc32(model->fingerprint, more, sizeof more);
 }
 
@@ -72,7 +74,7 @@ int run_pe(int pe, const struct model *model, const struct options *options,
     jl_par par = { .failed = JL_OK };   /* also if its init refuses */
 
     if (owner == NULL || buf == NULL || mode_status == NULL || z == NULL
-        || bank_open(&bank, model, options->form) != 0) {
+        || bank_open(&bank, model, options) != 0) {
         complain(model->path, 0, NULL, "no memory for its filter");
         status = JL_ENOMEM;
     } else {

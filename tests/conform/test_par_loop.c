@@ -131,6 +131,78 @@ static void test_par_leaves_spare_pes_idle(void **state)
                 compare(&run, slots);
 }
 
+/* --- the gate ------------------------------------------------------------- */
+
+/* The reference shows what is to be compared: rejections, some after some that
+ * are missing, and measurements accepted after too many of them. */
+static void check_gated(const struct par_shape *shape)
+{
+    static struct par_trace serial;
+    int k, run = 0, rejected = 0, forced = 0;
+
+    par_serial(&serial, shape);
+    for (k = 0; k < PAR_STEPS && serial.status[k] == JL_OK; k++)
+        if (serial.verdict[k] == JL_REJECTED) {
+            run++;
+            rejected++;
+        } else if (serial.verdict[k] == JL_ACCEPTED) {
+            forced += run == JL_GATE_MOST;
+            run = 0;
+        }
+    assert_int_equal(serial.verdict[18], JL_REJECTED);  /* JL_REAL_MAX */
+    assert_true(rejected >= 14);
+    assert_int_equal(forced, 2);
+    assert_int_equal(serial.verdict[33], JL_MISSING);
+}
+
+static void test_par_gate_gives_serial_bits(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .gate = 1 } };
+    struct par_shape *s = &run.shape;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 1; s->npe <= 8; s->npe++) {
+            compare_all(&run);
+            check_gated(s);
+        }
+}
+
+static void test_par_gate_with_few_modes(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .gate = 1 } };
+    struct par_shape *s = &run.shape;
+
+    (void)state;
+    for (s->M = 1; s->M <= 5; s->M++)
+        for (s->npe = 1; s->npe <= 5; s->npe += 2)
+            compare_all(&run);
+}
+
+/* A PE alone has nothing to reduce. */
+static void test_par_gate_is_not_for_an_all_reduce(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .gate = 1 } };
+    struct par_shape *s = &run.shape;
+    int k;
+
+    (void)state;
+    s->form = &jl_kf_joseph;
+    s->M = PAR_M;
+    s->sticky = 1;
+    s->exchange = JL_EXCHANGE_REDUCE;
+    for (s->npe = 2; s->npe <= 5; s->npe++) {
+        parallel(&run, 1);
+        for (k = 0; k < PAR_STEPS; k++)
+            assert_int_equal(run.trace.status[k], JL_EGATE);
+    }
+    s->npe = 1;
+    compare(&run, 1);
+    assert_int_equal(run.trace.verdict[14], JL_REJECTED);
+}
+
 /* --- the all-reduce ------------------------------------------------------ */
 
 /* The metric of a reference case: x in sigmas, P by sigmas, mu absolute, the
@@ -241,7 +313,7 @@ static void test_par_blames_the_dead_and_not_the_relay(void **state)
 #define REFUSALS 9
 
 static const struct par_shape one_pe = {
-    1, 3, 1, &jl_kf_joseph, JL_TOPO_FULL, JL_EXCHANGE_GATHER, 0, -1
+    .npe = 1, .M = 3, .sticky = 1, .form = &jl_kf_joseph, .hangs_at = -1
 };
 
 struct refusal {
@@ -334,7 +406,7 @@ static void test_par_refuses_bad_measurements_with_a_code(void **state)
 /* --- a PE1 that says what does not belong here --------------------------- */
 
 static const struct par_shape two_pes = {
-    2, 3, 1, &jl_kf_joseph, JL_TOPO_FULL, JL_EXCHANGE_GATHER, 0, -1
+    .npe = 2, .M = 3, .sticky = 1, .form = &jl_kf_joseph, .hangs_at = -1
 };
 
 #define MODES_LEN (8 + 2 + (1 + PAR_N + JL_PACKED(PAR_N)) * JL_REAL_OCTETS)
@@ -493,6 +565,9 @@ int main(void)
         cmocka_unit_test(test_par_gives_serial_bits_for_any_pes_and_topology),
         cmocka_unit_test(test_par_gives_serial_bits_on_sixteen_pes),
         cmocka_unit_test(test_par_leaves_spare_pes_idle),
+        cmocka_unit_test(test_par_gate_gives_serial_bits),
+        cmocka_unit_test(test_par_gate_with_few_modes),
+        cmocka_unit_test(test_par_gate_is_not_for_an_all_reduce),
         cmocka_unit_test(test_par_reduce_equals_serial_up_to_rounding),
         cmocka_unit_test(test_par_reduce_refuses_a_chain_that_is_not_sticky),
         cmocka_unit_test(test_par_blames_the_dead_and_not_the_relay),

@@ -43,14 +43,14 @@ static void compare(struct run *run, int slots)
     assert_same_bits(&run->trace, &serial, sizeof serial);
 }
 
-static void test_par_gives_serial_bits_on_threads(void **state)
+static void compare_all(int gate)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
     struct par_shape *s = &run.shape;
     int slots, forms;
 
-    (void)state;
     s->M = PAR_M;
+    s->gate = gate;
     for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
          s->topology++)
         for (s->npe = 1; s->npe <= 8; s->npe++)
@@ -63,10 +63,23 @@ static void test_par_gives_serial_bits_on_threads(void **state)
                     }
 }
 
+static void test_par_gives_serial_bits_on_threads(void **state)
+{
+    (void)state;
+    compare_all(0);
+}
+
+static void test_par_gate_gives_serial_bits_on_threads(void **state)
+{
+    (void)state;
+    compare_all(1);
+}
+
 int main(void)
 {
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_on_threads),
+        cmocka_unit_test(test_par_gate_gives_serial_bits_on_threads),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
