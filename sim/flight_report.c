@@ -71,13 +71,13 @@ void flight_run_name(struct flight_run *run, const struct model *model,
 static double velocity_error(const struct flight_run *run,
                              const struct data_file *data, long row)
 {
-    int n = run->e.n, order = run->source->motions[0].order;
+    int n = run->e.n, north = n / 2;
     const jl_real *x = run->e.x + row * n;
     const double *truth = data->extra + row * data->n_extra;
 
     if (isnan(run->e.us[row]))
         return (double)NAN;
-    return hypot((double)x[1] - truth[0], (double)x[order + 1] - truth[1]);
+    return hypot((double)x[1] - truth[0], (double)x[north + 1] - truth[1]);
 }
 
 static double rms_error(const struct flight_run *run,
@@ -244,7 +244,7 @@ static int plot_model(const struct flight_report *r, int first, int count,
     char file[WAYS][128], legend[WAYS][48], north[16], name[128], title[128];
     int i, status;
 
-    snprintf(north, sizeof north, "x%d", runs->source->motions[0].order);
+    snprintf(north, sizeof north, "x%d", runs->e.n / 2);
     track[0] = (struct plot_series){ "track.csv", "east_m", "north_m",
                                      "measured", PLOT_DOTS };
     error[0] = (struct plot_series){ "track.csv", time, "held",

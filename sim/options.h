@@ -75,8 +75,11 @@ struct options {
     "The model is JSON.  Modes of the catalogue follow any time step; each\n" \
     "has an accel_std and a type: cv; ca (order 3); ct (axes 2), with a\n" \
     "turn_rate; singer (order 3), with a tau_s.  At the top: axes, order,\n" \
-    "sigma_z, and sojourn_s or Pi.  Or modes by matrices: Phi, Gamma, Q, H,\n" \
-    "R, and n, m, Pi, mu0 at the top.\n\n"
+    "sigma_z, and sojourn_s or Pi; and v0_std, a0_std of velocity (default\n" \
+    "100) and acceleration (10) before anything is known.  A mode may have\n" \
+    "order 2 beside others of order 3, the model's: to them its acceleration\n" \
+    "is 0 +- a0_std.  Or modes by matrices: Phi, Gamma, Q, H, R, and n, m,\n" \
+    "Pi, mu0 at the top.\n\n"
 #define DATA_HELP \
     "  --hold HOW        which measurements count as lost: none; detect:\n" \
     "                    those that repeat the row before exactly; column:\n" \

@@ -41,17 +41,6 @@
 extern "C" {
 #endif
 
-/* What every mode rejects, the filter rejects (jl_imm_gate): the modes are only
- * predicted, as if it were missing.  A gate of each mode by itself would be
- * wrong: the mode that rejects avoids a bad likelihood, and wins.
- *
- * Modes may have different states (jl_imm_sizes): position and velocity in one,
- * acceleration too in another.  In the filter every mode has all n components;
- * those that a mode lacks have a stated prior, independent of the others, as
- * the mode's estimate after every prediction.  So the certainty of a mode that
- * has no acceleration does not leak into one that has.
- */
-
 enum {                          /* how to mix */
     JL_MIX_AUTO = 0,            /* sticky where the chain allows it         */
     JL_MIX_GENERAL = 1          /* always the general sums                  */
@@ -76,7 +65,7 @@ typedef struct jl_imm {
     int verdict;                /* on the z of the step under way, or of the
                                    last: JL_ACCEPTED, JL_MISSING, JL_REJECTED */
 
-    /* modes of different states; NULL: all have n */
+    /* of modes that lack components (jl_imm_init_sizes) */
     const int *const *map;      /* [M][modes[j].n]                          */
     const jl_real *prior_x;     /* [n]                                      */
     const jl_real *prior_var;   /* [n]                                      */
@@ -127,20 +116,45 @@ typedef struct jl_imm {
 int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
                 const jl_kf_form *form, int mixing, jl_real *mem, int cap);
 
-/* The same with modes of different states, n components in all: mode j has the
- * components map[j][0] < map[j][1] < .. < n (modes[j].n of them; map[j] NULL:
- * all n), and of the others the prior mean prior_x [n] and variance prior_var
- * [n] >= 0.  All arrays outlive the filter.
- * Returns as jl_imm_init, JL_EDIM for a map that is not as said too, and
- * JL_ENONFINITE or JL_ERANGE (a variance below 0) for a prior. */
+/* The same with modes of different states, n components in all: mode j has
+ * modes[j].n of them, map[j][0] < map[j][1] < .. < n in this order (map[j] is
+ * not read if that is all n).  What it lacks has, after each of its
+ * predictions, a stated mean and variance, independent of the rest:
+ *     x_j[i] = prior_x[i],  P_j[i][i] = prior_var[i]
+ * as if it were padded to n with zeros in F and H, prior_x as mean and prior_var
+ * as variance of its noise; but predict and update cost what its own size does.
+ *
+ * The prior is what the component is like when a mode that has it takes over,
+ * say the acceleration at the start of a manoeuvre: for one within +-a, mean 0
+ * and variance a^2/3.  Three times too large or small does little harm.  A
+ * variance of almost nothing is how padding goes wrong: every mixing then tells
+ * the modes that have the component that it is known, and they are slow to see
+ * it change; with a huge one they forget what they knew.  xhat and Phat count
+ * the prior of modes that lack the component, in proportion to mu.
+ * (Granstrom, Willett, Bar-Shalom 2015, IEEE Trans. AES 51, 2975, on mixing
+ * states of unequal dimension.  Yuan, Bar-Shalom, Willett, Mozeson, Pollak,
+ * Hardiman 2012, 48, 3250, fill in the receiving mode's own estimate, which
+ * differs for each mode, so that no sticky mixing is possible.)
+ *
+ *     static const int cv[] = { 0, 1, 3, 4 };     (of x vx ax y vy ay)
+ *     static const int *const map[] = { cv, NULL };
+ *     static const jl_real mean[6], var[6] = { 0, 0, 30, 0, 0, 30 };
+ *
+ * prior_x, prior_var [n] are read only where a mode lacks the component; they
+ * and the maps outlive the filter.
+ * Returns as jl_imm_init, JL_EDIM also for a map that is not as said, a
+ * component that no mode has, or a form for fixed sizes where one is lacking;
+ * JL_ENONFINITE, JL_ERANGE (a variance that is not above 0) for a prior. */
 int jl_imm_init_sizes(jl_imm *imm, int M, int n, const jl_mode *modes,
                       const int *const *map, const jl_real *prior_x,
                       const jl_real *prior_var, const jl_kf_form *form,
                       int mixing, jl_real *mem, int cap);
 
 /* Gate: as jl_kf_gate, for a measurement whose nis is above `nis` in every mode
- * that is possible; then mu becomes c.  One that a mode accepts is used by all:
- * the bits are those without a gate.  Ends a step under way.
+ * that is possible: then the modes are only predicted, and mu becomes c.  One
+ * that a mode accepts is used by all: the bits are those without a gate.  (If
+ * each mode had a gate by itself, one that rejects would avoid a bad
+ * likelihood, and win.)  Ends a step under way.
  * Returns JL_OK, or JL_ERANGE (nis not finite or below 0, most below 0). */
 int jl_imm_gate(jl_imm *imm, jl_real nis, int most);
 
@@ -154,7 +168,7 @@ int jl_imm_chain(jl_imm *imm, const jl_real *Pi);
 
 /* Set the state: x [M,n], P [M,n,n], mu [M] (copied); scratch
  * [JL_IMM_SCRATCH(M, n, m)].  A probability of 0 is allowed.  Of components
- * that a mode lacks, the prior is set.
+ * that a mode lacks, x and P are checked (zeros will do) and the prior is set.
  * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF, JL_EPROB; unchanged on
  * error. */
 int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,

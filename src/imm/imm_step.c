@@ -21,7 +21,7 @@ static struct place own(const jl_imm *imm, int j, jl_real *scratch)
     p.rest = p.new_P + k * k;
     p.x = imm->xw + j * n;
     p.P = imm->Pw + j * n * n;
-    if (imm->map != NULL) {
+    if (JLI_LACKS(imm, j)) {
         jl_real *x = p.rest, *P = x + k;
 
         jli_own_states(x, P, imm, j, p.x, p.P, P + k * k);
@@ -37,7 +37,7 @@ static void put_back(jl_imm *imm, int j, const struct place *p)
     int n = imm->n;
     jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
 
-    if (imm->map != NULL) {
+    if (JLI_LACKS(imm, j)) {
         jli_all_states(x, P, imm, j, p->new_x, p->new_P);
     } else {
         jli_copy(x, p->new_x, n);
@@ -131,16 +131,17 @@ static jl_real best_likelihood(const jl_imm *imm)
     return best;
 }
 
+/* As in kf.c, counts stay where they are as large as can be. */
 static void count(jl_imm *imm)
 {
     int j;
 
     if (imm->verdict == JL_REJECTED) {
-        imm->run++;
+        imm->run += imm->run < INT_MAX;
         imm->rejected++;
     } else if (imm->verdict == JL_ACCEPTED) {
         imm->run = 0;
-        imm->accepted++;
+        imm->accepted += imm->accepted < ULONG_MAX;
         for (j = 0; j < imm->M; j++)
             imm->nis_mean[j] += (imm->nis[j] - imm->nis_mean[j])
                 / (jl_real)imm->accepted;

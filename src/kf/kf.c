@@ -77,6 +77,8 @@ static jl_real limit(const jl_kf *kf)
     return kf->gate > 0 && kf->run >= kf->most ? JL_REAL_MAX : kf->gate;
 }
 
+/* Counts stay where they are as large as can be: a mean divides by one, and one
+ * that is signed must not overflow. */
 static void count(jl_kf *kf, const jl_innovation *got)
 {
     jl_real *nu = kf->innovation.nu;
@@ -85,11 +87,11 @@ static void count(jl_kf *kf, const jl_innovation *got)
     kf->innovation = *got;
     kf->innovation.nu = nu;
     if (kf->verdict == JL_REJECTED) {
-        kf->run++;
+        kf->run += kf->run < INT_MAX;
         kf->rejected++;
     } else {
         kf->run = 0;
-        kf->accepted++;
+        kf->accepted += kf->accepted < ULONG_MAX;
         kf->nis_mean += (got->nis - kf->nis_mean) / (jl_real)kf->accepted;
     }
 }

@@ -43,7 +43,7 @@ static struct one rig, twin, before;
 /* A CV mode, started at 0. */
 static void make(struct one *o, const jl_kf_form *form)
 {
-    const jl_motion motion = { JL_MOTION_CV, 1, 2, JL_C(0.5), 0, 3 };
+    const jl_motion motion = { JL_MOTION_CV, 1, 2, JL_C(0.5), 0, 3, 0 };
     const jl_real zero = 0;
     jl_real x[N], P[N * N];
 
@@ -440,7 +440,7 @@ static void gather(struct many *b, const jl_kf_form *form, const jl_real *Pi)
 
     memset(b, 0, sizeof *b);
     for (j = 0; j < M; j++) {
-        jl_motion motion = { JL_MOTION_CV, 1, 2, 0, 0, 1 };
+        jl_motion motion = { JL_MOTION_CV, 1, 2, 0, 0, 1, 0 };
 
         motion.accel_std = accel_std[j];
         assert_int_equal(jl_mode_init(&b->modes[j], N, 1, 1, b->mode_mem[j],
