@@ -57,8 +57,9 @@ struct jl_mode {
  * *mode is untouched on error. */
 int jl_mode_init(jl_mode *mode, int n, int m, int p, jl_real *mem, int cap);
 
-/* Give a mode its matrices (copied): F [n,n] G [n,p] Q [p,p] w_bar [p] or NULL
- * for 0, H [m,n] R [m,m]; scratch [JL_MODE_SCRATCH(n, m, p)].
+/* Give a mode its matrices (copied): F [n,n] G [n,p] Q [p,p] w_bar [p], H [m,n]
+ * R [m,m]; scratch [JL_MODE_SCRATCH(n, m, p)].  NULL for w_bar is 0, and so it
+ * is for F and H, in modes that have functions in their place.
  * Q must be positive semidefinite, R positive definite.
  * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF; *mode is untouched on
  * error. */

@@ -515,6 +515,28 @@ static void test_nonlinear_model_may_be_set_anew(void **state)
     assert_true(a->move == NULL && a->sense == NULL);
 }
 
+/* What functions stand for needs no matrix. */
+static void test_nonlinear_needs_no_matrices(void **state)
+{
+    jl_mode *a = &rig.modes[0];
+    jl_real G[3] = { 1, 2, 3 }, q = 1, w_bar = 2, R[4] = { 1, 0, 0, 1 };
+    int i;
+
+    (void)state;
+    make(&rig, &jl_kf_joseph, 3, 2);
+    assert_int_equal(jl_mode_set(a, NULL, G, &q, &w_bar, NULL, R, scratch),
+                     JL_OK);
+    for (i = 0; i < 9; i++) {
+        assert_true(a->F[i] == 0);
+        assert_true(a->H[i % 6] == 0);
+        assert_true(a->u[i % 3] == 2 * G[i % 3]);
+    }
+    assert_int_equal(jl_mode_set(a, NULL, G, &q, NULL, NULL, R, scratch),
+                     JL_OK);
+    for (i = 0; i < 3; i++)
+        assert_true(a->u[i] == 0);
+}
+
 static void test_nonlinear_refuses_kappa(void **state)
 {
     const jl_real bad[] = { -1, -JL_EPSILON, NAN_, INF_, 2 * JL_LARGE };
@@ -916,6 +938,7 @@ int main(void)
         cmocka_unit_test(test_nonlinear_falls_back_to_matrices),
         cmocka_unit_test(test_nonlinear_halves),
         cmocka_unit_test(test_nonlinear_model_may_be_set_anew),
+        cmocka_unit_test(test_nonlinear_needs_no_matrices),
         cmocka_unit_test(test_nonlinear_refuses_kappa),
         cmocka_unit_test(test_nonlinear_jacobian_f_by_differences),
         cmocka_unit_test(test_nonlinear_jacobian_h_by_differences),
