@@ -11,6 +11,7 @@ static const char help[] =
     "Runs a filter over the measurements in a file and writes its\n"
     "estimates as CSV: time, x0.., P00,P01.. (upper triangle), mu0..,\n"
     "loglik.\n\n"
+    MODEL_HELP
     "  -o, --out FILE    where to (default: standard output)\n"
     COMMON_HELP
     DATA_HELP

@@ -272,6 +272,9 @@ static int plot_run_modes(const struct flight_report *r,
         if (motion->kind == JL_MOTION_CT)
             snprintf(label[j], sizeof label[j], "CT %+g rad/s",
                      (double)motion->turn_rate);
+        else if (motion->kind == JL_MOTION_SINGER)
+            snprintf(label[j], sizeof label[j], "Singer %g m/s^2, %g s",
+                     (double)motion->accel_std, (double)motion->tau_s);
         else
             snprintf(label[j], sizeof label[j], "%s %g m/s^2",
                      motion->kind == JL_MOTION_CV ? "CV" : "CA",

@@ -325,6 +325,20 @@ static int read_matrices(struct model *model, const struct json_at *top)
 
 /* --- modes of the catalogue -------------------------------------------- */
 
+/* A number above 0; `usual` when it may be left out, else 0. */
+static int take_above_0(jl_real *value, const struct json_at *at,
+                        const char *key, jl_real usual)
+{
+    *value = usual;
+    if (usual > 0 && !json_has(at, key))
+        return 0;
+    if (json_take_real(value, at, key) != 0)
+        return -1;
+    if (!(*value > 0))
+        return json_wrong(at, key, "%.9g: must be above 0", (double)*value);
+    return 0;
+}
+
 static int take_type(int *kind, const struct json_at *mode, int axes,
                      int order)
 {
@@ -339,12 +353,12 @@ static int take_type(int *kind, const struct json_at *mode, int axes,
     else if (strcmp(type, "ct") == 0)
         *kind = JL_MOTION_CT;
     else if (strcmp(type, "singer") == 0)
-        return json_wrong(mode, "type",
-                          "'singer' is not supported by this version");
+        *kind = JL_MOTION_SINGER;
     else
-        return json_wrong(mode, "type", "'%.40s' is not cv, ca or ct", type);
-    if (*kind == JL_MOTION_CA && order != 3)
-        return json_wrong(mode, "type", "ca needs order 3");
+        return json_wrong(mode, "type", "'%.40s' is not cv, ca, ct or singer",
+                          type);
+    if ((*kind == JL_MOTION_CA || *kind == JL_MOTION_SINGER) && order != 3)
+        return json_wrong(mode, "type", "%s needs order 3", type);
     if (*kind == JL_MOTION_CT && axes != 2)
         return json_wrong(mode, "type", "ct needs axes 2");
     return 0;
@@ -358,10 +372,14 @@ static int take_motion(jl_motion *motion, const struct json_at *mode)
     static const char *const keys_ct[] = {
         "type", "accel_std", "turn_rate", "x0", "P0", NULL
     };
+    static const char *const keys_singer[] = {
+        "type", "accel_std", "tau_s", "x0", "P0", NULL
+    };
 
     if (take_type(&motion->kind, mode, motion->axes, motion->order) != 0)
         return -1;
-    if (json_only(mode, motion->kind == JL_MOTION_CT ? keys_ct : keys) != 0
+    if (json_only(mode, motion->kind == JL_MOTION_CT ? keys_ct
+                  : motion->kind == JL_MOTION_SINGER ? keys_singer : keys) != 0
         || json_take_real(&motion->accel_std, mode, "accel_std") != 0)
         return -1;
     if (motion->accel_std < 0)
@@ -369,20 +387,8 @@ static int take_motion(jl_motion *motion, const struct json_at *mode)
                           "not negative", (double)motion->accel_std);
     if (motion->kind == JL_MOTION_CT)
         return json_take_real(&motion->turn_rate, mode, "turn_rate");
-    return 0;
-}
-
-/* A standard deviation above 0; `usual` when it may be left out, else 0. */
-static int take_std(jl_real *value, const struct json_at *top,
-                    const char *key, jl_real usual)
-{
-    *value = usual;
-    if (usual > 0 && !json_has(top, key))
-        return 0;
-    if (json_take_real(value, top, key) != 0)
-        return -1;
-    if (!(*value > 0))
-        return json_wrong(top, key, "%.9g: must be above 0", (double)*value);
+    if (motion->kind == JL_MOTION_SINGER)
+        return take_above_0(&motion->tau_s, mode, "tau_s", 0);
     return 0;
 }
 
@@ -417,17 +423,19 @@ static int take_motions(struct model *model, const struct json_at *top,
     model->motions = calloc((size_t)model->M, sizeof *model->motions);
     if (model->motions == NULL)
         return no_memory(top);
-    for (i = 0; i < model->M; i++)
-        p[i] = common->axes;
-    if (make_modes(model, top, p) != 0)
-        return -1;
     for (i = 0; i < model->M; i++) {
         model->motions[i] = *common;
         if (json_entry(&mode, top, "modes", i) != 0
-            || take_motion(&model->motions[i], &mode) != 0
+            || take_motion(&model->motions[i], &mode) != 0)
+            return -1;
+        p[i] = jl_motion_noises(&model->motions[i]);
+    }
+    if (make_modes(model, top, p) != 0)
+        return -1;
+    for (i = 0; i < model->M; i++)
+        if (json_entry(&mode, top, "modes", i) != 0
             || try_motion(model, &mode, i) != 0)
             return -1;
-    }
     return 0;
 }
 
@@ -437,14 +445,14 @@ static int read_catalogue(struct model *model, const struct json_at *top)
         "kind", "axes", "order", "sigma_z", "v0_std", "a0_std",
         "sojourn_s", "Pi", "mu0", "modes", "x0", "P0", NULL
     };
-    jl_motion common = { 0, 0, 0, 0, 0, 0 };
+    jl_motion common = { 0, 0, 0, 0, 0, 0, 0 };
 
     if (json_only(top, keys) != 0
         || json_take_count(&common.axes, top, "axes", 1, JL_MAX_STATES / 3)
         || json_take_count(&common.order, top, "order", 2, 3) != 0
-        || take_std(&common.sigma_z, top, "sigma_z", 0) != 0
-        || take_std(&model->v0_std, top, "v0_std", 100) != 0
-        || take_std(&model->a0_std, top, "a0_std", 10) != 0)
+        || take_above_0(&common.sigma_z, top, "sigma_z", 0) != 0
+        || take_above_0(&model->v0_std, top, "v0_std", 100) != 0
+        || take_above_0(&model->a0_std, top, "a0_std", 10) != 0)
         return -1;
     model->n = common.axes * common.order;
     model->m = common.axes;

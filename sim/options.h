@@ -62,6 +62,12 @@ struct options {
     "  --mode J          ... of this one, from 0 (default: the only one)\n" \
     "  --form joseph|standard  how covariances are updated (default\n" \
     "                    joseph)\n"
+#define MODEL_HELP \
+    "The model is JSON.  Modes of the catalogue follow any time step; each\n" \
+    "has an accel_std and a type: cv; ca (order 3); ct (axes 2), with a\n" \
+    "turn_rate; singer (order 3), with a tau_s.  At the top: axes, order,\n" \
+    "sigma_z, and sojourn_s or Pi.  Or modes by matrices: Phi, Gamma, Q, H,\n" \
+    "R, and n, m, Pi, mu0 at the top.\n\n"
 #define DATA_HELP \
     "  --hold HOW        which measurements count as lost: none; detect:\n" \
     "                    those that repeat the row before exactly; column:\n" \

@@ -127,7 +127,8 @@ int jl_mode_sense(jl_real *nu, jl_real *H, const jl_mode *mode,
 enum {
     JL_MOTION_CV = 1,           /* constant velocity                        */
     JL_MOTION_CA = 2,           /* constant acceleration                    */
-    JL_MOTION_CT = 3            /* coordinated turn of known rate, 2 axes   */
+    JL_MOTION_CT = 3,           /* coordinated turn of known rate, 2 axes   */
+    JL_MOTION_SINGER = 4        /* acceleration that decays                 */
 };
 
 /* A motion along `axes` coordinates.  The state holds per axis position and
@@ -139,25 +140,40 @@ enum {
  *     CA  F = [1 T T^2/2; 0 1 T; 0 0 1], G = [T^2/2; T; 1]       (order 3)
  *     CT  the velocity turns by turn_rate T and the position follows; G as CV
  *         (axes 2; order 2, or 3 with zero acceleration)
- * and Q = accel_std^2 I, R = sigma_z^2 I, one noise an axis. */
+ * and Q = accel_std^2 I, one noise an axis;
+ *     Singer  the acceleration is a Markov process of standard deviation
+ *         accel_std and correlation time tau_s: with a = 1 / tau_s,
+ *         F = [1 T (a T - 1 + exp(-a T)) / a^2; 0 1 (1 - exp(-a T)) / a;
+ *              0 0 exp(-a T)],  W = 2 a accel_std^2 * integral over 0..T of f f'
+ *         where f is F's last column (Singer 1970).  W has full rank: three
+ *         noises an axis.                                     (order 3)
+ * R = sigma_z^2 I.  Singer's F, W, N, q are within 5 JL_EPSILON of themselves,
+ * exp(-a T) within JL_EPSILON of 1, for any T / tau_s. */
 typedef struct jl_motion {
     int kind;                   /* JL_MOTION_...                            */
     int axes;                   /* 1 or more; CT: 2                         */
-    int order;                  /* 2 or 3; CA: 3                            */
+    int order;                  /* 2 or 3; CA, Singer: 3                    */
     jl_real accel_std;          /* [m/s^2] >= 0                             */
     jl_real turn_rate;          /* [rad/s] CT only; may be 0                */
     jl_real sigma_z;            /* [m] > 0                                  */
+    jl_real tau_s;              /* [s] > 0, Singer only                     */
 } jl_motion;
 
-/* Sizes of a motion's mode: n = axes order, m = p = axes. */
+/* The sizes of a motion's mode are n = axes order, m = axes, and p = this:
+ * axes; Singer: 3 axes, as many as n.
+ * Returns p, or JL_EDIM for a motion that is none (axes, order, kind). */
+int jl_motion_noises(const jl_motion *motion);
 
 /* Fill a mode (of the sizes above) for time step dt [s] >= 0; over dt = 0
  * positions and velocities stay.  Cheap enough for every step of an irregular
- * record.
+ * record; and no gap in one is too long: dt may be up to sqrt(JL_LARGE) (float:
+ * 1e9 s), accel_std dt^2 / 2 up to JL_LARGE.  CT turns by turn_rate dt, rounded,
+ * less whole turns: an angle that is off by JL_EPSILON |turn_rate| dt at most,
+ * which becomes a turn in float at 5e7 rad.
  * Returns JL_OK, JL_EDIM (sizes, axes, order, kind), JL_ENONFINITE (a number
  * of the motion or dt above sqrt(JL_LARGE), or a product above JL_LARGE),
- * JL_ERANGE (accel_std < 0, sigma_z^2 < JL_REAL_MIN, |turn_rate| dt > 1024),
- * JL_ETIME (dt < 0); *mode is untouched on error. */
+ * JL_ERANGE (accel_std < 0, sigma_z^2 < JL_REAL_MIN, tau_s <= 0 or tau_s
+ * below 1 / sqrt(JL_LARGE)), JL_ETIME (dt < 0); *mode is untouched on error. */
 int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt);
 
 /* The state after a first measurement z [axes]: x [n] at z with velocity 0 and

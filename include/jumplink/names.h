@@ -13,6 +13,7 @@
 #define jl_exp jl_exp_f32
 #define jl_log jl_log_f32
 #define jl_sincos jl_sincos_f32
+#define jl_atan2 jl_atan2_f32
 
 #define jl_mat_mul jl_mat_mul_f32
 #define jl_mat_mul_t jl_mat_mul_t_f32
@@ -34,6 +35,7 @@
 #define jl_mode_move jl_mode_move_f32
 #define jl_mode_sense jl_mode_sense_f32
 #define jl_mode_motion jl_mode_motion_f32
+#define jl_motion_noises jl_motion_noises_f32
 #define jl_motion_start jl_motion_start_f32
 #define jl_chain_sojourn jl_chain_sojourn_f32
 #define jl_chain_check jl_chain_check_f32

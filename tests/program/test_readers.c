@@ -581,16 +581,26 @@ static void test_model_mistakes_of_the_catalogue(void **state)
         { "20.0", "20, \"v0_std\": 0", "json: v0_std: ", "above 0" },
         { "20.0", "20, \"a0_std\": -1", "json: a0_std: ", "above 0" },
         { "20.0", "20, \"n\": 4", "json: n: ", "unknown key" },
-        { "\"cv\"", "\"cw\"", "modes[0].type: ", "'cw' is not cv, ca or ct" },
-        { "\"cv\"", "\"singer\"", "modes[0].type: ",
-          "'singer' is not supported by this version" },
+        { "\"cv\"", "\"cw\"", "modes[0].type: ", "'cw' is not cv, ca, ct or singer" },
         { "\"type\": \"ca\", ", "", "modes[1].type: ", "missing" },
         { "0.5}", "-0.5}", "modes[0].accel_std: ", "not negative" },
         { "0.5}", "\"0.5\"}", "modes[0].accel_std: ", "must be a number" },
         { "0.5}", "0.5, \"turn_rate\": 1}", "modes[0].turn_rate: ",
           "unknown key" },
         { "\"turn_rate\": -0.25,", "", "modes[2].turn_rate: ", "missing" },
-        { "-0.25", "1025", "json: modes[2]: ", "domain" },
+        { "\"ca\"", "\"singer\"", "modes[1].tau_s: ", "missing" },
+        { "\"ca\"", "\"singer\", \"tau_s\": 0", "modes[1].tau_s: ",
+          "0: must be above 0" },
+        { "\"ca\"", "\"singer\", \"tau_s\": -3", "modes[1].tau_s: ",
+          "-3: must be above 0" },
+        { "\"ca\"", "\"singer\", \"tau_s\": \"3\"", "modes[1].tau_s: ",
+          "must be a number" },
+        { "\"ca\"", "\"singer\", \"tau_s\": " HUGE_STD, "json: modes[1]: ",
+          "not finite or too large" },
+        { "\"ca\"", "\"singer\", \"tau_s\": 3, \"turn_rate\": 1",
+          "modes[1].turn_rate: ", "unknown key" },
+        { "\"ca\"", "\"ca\", \"tau_s\": 3", "modes[1].tau_s: ",
+          "unknown key" },
         { "[60, 10, 20]", "[60, 10]", "json: sojourn_s: ",
           "3 numbers, has 2" },
         { "[60, 10, 20]", "[60, 0, 20]", "json: sojourn_s[1]: ", "above 0" },
@@ -605,6 +615,37 @@ static void test_model_mistakes_of_the_catalogue(void **state)
 
     (void)state;
     bad_edits(catalogue, edits);
+}
+
+/* A catalogue's mode with more noises than others: order, sizes, numbers. */
+static void test_model_takes_singer(void **state)
+{
+    static const char text[] =
+        "{ \"kind\": \"imm\", \"axes\": 2, \"order\": 3, "
+        "\"sigma_z\": 20.0,\n"
+        "  \"sojourn_s\": [60, 10, 20],\n"
+        "  \"modes\": [ {\"type\": \"singer\", \"tau_s\": 12.5, "
+        "\"accel_std\": 0.5},\n"
+        "    {\"type\": \"cv\", \"accel_std\": 4},\n"
+        "    {\"type\": \"singer\", \"accel_std\": 2, \"tau_s\": 3} ] }\n";
+    struct model model;
+
+    (void)state;
+    assert_int_equal(model_read(&model, scratch_write("m.json", text)), 0);
+    assert_int_equal(model.n, 6);
+    assert_int_equal(model.m, 2);
+    assert_int_equal(model.modes[0].p, 6);
+    assert_int_equal(model.modes[1].p, 2);
+    assert_int_equal(model.modes[2].p, 6);
+    assert_int_equal(model.motions[0].kind, JL_MOTION_SINGER);
+    assert_close(model.motions[0].tau_s, 12.5, 0);
+    assert_close(model.motions[0].accel_std, 0.5, 0);
+    assert_close(model.motions[2].tau_s, 3, 0);
+    model_free(&model);
+    bad_model("{ \"kind\": \"imm\", \"axes\": 1, \"order\": 2, "
+              "\"sigma_z\": 1, \"sojourn_s\": [1], \"modes\": "
+              "[ {\"type\": \"singer\", \"tau_s\": 1, \"accel_std\": 1} ] }",
+              "modes[0].type: ", "singer needs order 3");
 }
 
 static void test_model_reference_cases(void **state)
@@ -658,6 +699,7 @@ int main(void)
         cmocka_unit_test(test_model_mistakes_of_keys_and_shapes),
         cmocka_unit_test(test_model_mistakes_of_numbers),
         cmocka_unit_test(test_model_mistakes_of_the_catalogue),
+        cmocka_unit_test(test_model_takes_singer),
         cmocka_unit_test(test_model_reference_cases)
     };
 
