@@ -48,11 +48,11 @@ void jl_mat_cholesky_solve(const jl_real *L, jl_real *X, int n, int m);
 /* Solve L y = b in place: y [n] holds b before and y after.       n n / 2  */
 void jl_mat_lower_solve(const jl_real *L, jl_real *y, int n);
 
-/* A = U' D U of a positive semidefinite A [n,n], by its largest pivots: U upper
- * with a unit diagonal, D diagonal.  In S [n,n]: U above the diagonal, D on it,
- * zeros below.  What is left of A when no pivot is above 64 n eps, scaled to a
- * unit diagonal, is taken for rounding.  S may be A.   work [n,n] + [2 n]
- *                                                              about n^3  */
+/* A = U' D U of a positive semidefinite A [n,n], of which the upper triangle is
+ * read, by its largest pivots: U upper with a unit diagonal, D diagonal, >= 0.
+ * In S [n,n]: U above the diagonal, D on it, zeros below.  What is left of A
+ * when no pivot is above 64 n eps, scaled to a unit diagonal, is taken for
+ * rounding.  S may be A.  work [n n + 2 n]                  at most 2 n^3 */
 void jl_mat_ud(jl_real *S, const jl_real *A, jl_real *work, int n);
 
 /* P = U' D U from S, as above.  P may not be S.                    n^3/3  */

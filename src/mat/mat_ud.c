@@ -25,9 +25,11 @@ void jl_mat_ud(jl_real *S, const jl_real *A, jl_real *work, int n)
     jl_real *B = work, *diagonal = B + n * n, *v = diagonal + n;
     int i, j, b, left;
 
-    jli_copy(B, A, n * n);
-    for (i = 0; i < n; i++)
+    for (i = 0; i < n; i++) {
         diagonal[i] = A[i * (n + 1)];
+        for (j = i; j < n; j++)
+            B[i * n + j] = B[j * n + i] = A[i * n + j];
+    }
     memset(S, 0, (size_t)(n * n) * sizeof *S);
     for (left = n; left > 0; left--) {
         jl_real d;
@@ -49,15 +51,5 @@ void jl_mat_ud(jl_real *S, const jl_real *A, jl_real *work, int n)
 
 void jl_mat_ud_product(jl_real *P, const jl_real *S, int n)
 {
-    int i, j, k;
-
-    for (i = 0; i < n; i++)
-        for (j = i; j < n; j++) {
-            jl_real s = S[i * n + i] * (i == j ? 1 : S[i * n + j]);
-
-            for (k = 0; k < i; k++)
-                s += S[k * n + k] * S[k * n + i] * S[k * n + j];
-            P[i * n + j] = s;
-            P[j * n + i] = s;
-        }
+    jli_ud_product(P, S, n);
 }

@@ -16,7 +16,9 @@ enum { M_MAX = 6, N_MAX = 4, Z_MAX = 2 };
 
 typedef long double wide;
 
-static const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard };
+static const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard,
+                                           &jl_kf_sqrt };
+#define FORMS 3
 static uint32_t seed;
 
 /* Uniform in [-1, 1). */
@@ -379,6 +381,7 @@ static void book_step(const jl_real *z)
 static void check_book(const jl_imm *imm, double tolerance,
                        double tolerance_log)
 {
+    jl_real P[N_MAX * N_MAX];
     int n = in.n, i, j, k;
 
     for (j = 0; j < in.M; j++) {
@@ -388,13 +391,13 @@ static void check_book(const jl_imm *imm, double tolerance,
             assert_close(imm->logmu[j], book.logmu[j], tolerance_log);
             assert_close(imm->mu[j], expl(book.logmu[j]), tolerance_log);
         }
+        jl_imm_cov(imm, j, P);
         for (i = 0; i < n; i++) {
             assert_close(imm->x[j * n + i], book.x[j][i], tolerance);
             for (k = 0; k < n; k++)
-                assert_close(imm->P[(j * n + i) * n + k], book.P[j][i][k],
-                             tolerance);
+                assert_close(P[i * n + k], book.P[j][i][k], tolerance);
         }
-        check_symmetric(imm->P + j * n * n, n);
+        check_symmetric(P, n);
     }
     for (i = 0; i < n; i++) {
         assert_close(imm->xhat[i], book.xhat[i], tolerance);
@@ -734,35 +737,34 @@ static void check_both_mixings(int f, int M, int kind, int steps)
 
 static void test_imm_general_chains(void **state)
 {
-    int M;
+    int f, M;
 
     (void)state;
-    for (M = 1; M <= M_MAX; M++) {
-        check_both_mixings(0, M, 0, 30);
-        check_both_mixings(1, M, 0, 30);
-    }
+    for (f = 0; f < FORMS; f++)
+        for (M = 1; M <= M_MAX; M++)
+            check_both_mixings(f, M, 0, 30);
 }
 
 static void test_imm_sticky_equals_general(void **state)
 {
-    int M;
+    int f, M;
 
     (void)state;
-    for (M = 1; M <= M_MAX; M++) {
-        check_both_mixings(0, M, 1, 30);
-        check_both_mixings(1, M, 2, 30);
-    }
+    for (f = 0; f < FORMS; f++)
+        for (M = 1; M <= M_MAX; M++)
+            check_both_mixings(f, M, 1 + f % 2, 30);
 }
 
 /* k sigma away from every mode. */
-static void check_outlier(int mixing, jl_real distance)
+static void check_outlier(const jl_kf_form *form, int mixing,
+                          jl_real distance)
 {
     jl_real z[Z_MAX];
     double size;
 
     make(4, 3, 2);
     make_sticky(JL_C(0.9));
-    bind(&rig, &jl_kf_joseph, mixing);
+    bind(&rig, form, mixing);
     book_start();
     z[0] = distance;
     z[1] = -distance;
@@ -780,13 +782,13 @@ static void check_outlier(int mixing, jl_real distance)
 
 static void test_imm_outliers(void **state)
 {
-    int mixing;
+    int run;
 
     (void)state;
-    for (mixing = 0; mixing <= 1; mixing++) {
-        check_outlier(mixing, 60);
-        check_outlier(mixing, 1500);
-        check_outlier(mixing, 1000000);
+    for (run = 0; run < 2 * FORMS; run++) {
+        check_outlier(forms[run / 2], run % 2, 60);
+        check_outlier(forms[run / 2], run % 2, 1500);
+        check_outlier(forms[run / 2], run % 2, 1000000);
     }
 }
 
@@ -899,16 +901,16 @@ static void check_mode_is(const jl_kf *kf, int j)
 
 static void test_imm_of_one_mode_is_a_kf(void **state)
 {
-    jl_real z[Z_MAX], loglik;
+    jl_real z[Z_MAX], loglik, P[9];
     jl_kf kf;
     int run, k;
 
     (void)state;
-    for (run = 0; run < 4; run++) {
+    for (run = 0; run < 2 * FORMS; run++) {
         make(1, 3, 2);
         in.Pi[0] = 1;
         in.mu[0] = 1;
-        bind(&rig, forms[run % 2], run / 2);
+        bind(&rig, forms[run / 2], run % 2);
         make_kf(&kf, 0, 0);
         for (k = 0; k < 40; k++) {
             const jl_real *given = k % 7 == 3 ? NULL : z;
@@ -921,7 +923,8 @@ static void test_imm_of_one_mode_is_a_kf(void **state)
             check_mode_is(&kf, 0);
             assert_same_bits(&rig.imm.loglik, &loglik, sizeof loglik);
             assert_same_bits(rig.imm.xhat, kf.x, 3 * sizeof *kf.x);
-            assert_same_bits(rig.imm.Phat, kf.P, 9 * sizeof *kf.P);
+            jl_kf_cov(&kf, P);
+            assert_same_bits(rig.imm.Phat, P, sizeof P);
             assert_true(rig.imm.mu[0] == 1 && rig.imm.logmu[0] == 0);
         }
     }
@@ -958,7 +961,8 @@ static void test_imm_of_equal_modes_is_a_kf(void **state)
 }
 
 /* A mode that cannot be entered filters alone, and does no harm. */
-static void check_unreachable(int mixing, const jl_real *Pi)
+static void check_unreachable(const jl_kf_form *form, int mixing,
+                              const jl_real *Pi)
 {
     jl_real z[Z_MAX];
     jl_kf kf;
@@ -969,7 +973,7 @@ static void check_unreachable(int mixing, const jl_real *Pi)
     in.mu[0] = JL_C(0.375);
     in.mu[1] = JL_C(0.625);
     in.mu[2] = 0;
-    bind(&rig, &jl_kf_joseph, mixing);
+    bind(&rig, form, mixing);
     make_kf(&kf, 2, 0);
     book_start();
     for (k = 0; k < 20; k++) {
@@ -998,14 +1002,14 @@ static void test_imm_mode_that_cannot_be_entered(void **state)
         { JL_C(0.4), JL_C(0.6), 0, JL_C(0.4), JL_C(0.6), 0,
           JL_C(0.4), JL_C(0.6), 0 }
     };
-    int k, mixing;
+    int k, run;
 
     (void)state;
     for (k = 0; k < 3; k++)
-        for (mixing = 0; mixing <= 1; mixing++) {
-            check_unreachable(mixing, chains[k]);
+        for (run = 0; run < 2 * FORMS; run++) {
+            check_unreachable(forms[run / 2], run % 2, chains[k]);
             jl_imm_chain(&rig.imm, chains[k]);
-            assert_int_equal(rig.imm.sticky, k > 0 && mixing == JL_MIX_AUTO);
+            assert_int_equal(rig.imm.sticky, k > 0 && run % 2 == JL_MIX_AUTO);
         }
 }
 
@@ -1155,7 +1159,7 @@ static void test_imm_improbable_modes_keep_their_estimate(void **state)
 }
 
 /* What all modes agree in, neither combining nor mixing moves. */
-static void check_agreed(int mixing)
+static void check_agreed(const jl_kf_form *form, int mixing)
 {
     int j;
 
@@ -1163,7 +1167,7 @@ static void check_agreed(int mixing)
         in.x[j] = 1.0e6f;
         in.P[j] = 1;
     }
-    bind(&rig, &jl_kf_joseph, mixing);
+    bind(&rig, form, mixing);
     assert_close(rig.imm.xhat[0], 1.0e6, 8.0e6 * EPS);
     assert_close(rig.imm.Phat[0], 1, 0.1);
     assert_int_equal(jl_imm_mix(&rig.imm, spoilt()), JL_OK);
@@ -1179,13 +1183,13 @@ static void test_imm_mu_within_tolerance(void **state)
     int run, j;
 
     (void)state;
-    for (run = 0; run < 4; run++) {
+    for (run = 0; run < 4 * FORMS; run++) {
         make(3, 1, 1);
-        if (run / 2)
+        if (run / 2 % 2)
             make_sticky(JL_C(0.85));
         for (j = 0; j < 3; j++)
             in.mu[j] = (1 + JL_C(0.9) * JL_PROB_TOLERANCE) / 3;
-        check_agreed(run % 2);
+        check_agreed(forms[run / 4], run % 2);
     }
 }
 
@@ -1202,7 +1206,7 @@ static void test_imm_mode_that_is_hardly_entered(void **state)
         in.Pi[2] = in.Pi[3] = JL_C(0.5);
         in.mu[0] = 1;
         in.mu[1] = JL_REAL_MIN * (4 + rnd());
-        check_agreed(run % 2);
+        check_agreed(forms[run % FORMS], run % 2);
         assert_int_equal(rig.imm.sticky, run % 2 == JL_MIX_AUTO);
     }
 }
@@ -1210,17 +1214,17 @@ static void test_imm_mode_that_is_hardly_entered(void **state)
 /* Estimates and covariances as large as they may be. */
 static void test_imm_mixing_cannot_overflow(void **state)
 {
-    int mixing, i, j;
+    int run, i, j;
 
     (void)state;
-    for (mixing = 0; mixing <= 1; mixing++) {
+    for (run = 0; run < 2 * FORMS; run++) {
         make(M_MAX, 1, 1);
         make_sticky(JL_C(0.5));
         for (j = 0; j < M_MAX; j++) {
             in.x[j] = j % 2 ? JL_LARGE : -JL_LARGE;
             in.P[j] = JL_LARGE * JL_LARGE;
         }
-        bind(&rig, &jl_kf_joseph, mixing);
+        bind(&rig, forms[run / 2], run % 2);
         jl_imm_combine(&rig.imm);
         assert_true(jl_vec_within(rig.imm.xhat, 1, JL_LARGE));
         assert_true(jl_vec_within(rig.imm.Phat, 1, JL_REAL_MAX));
@@ -1316,7 +1320,7 @@ static void test_imm_routes_to_the_same_bits(void **state)
     int f;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         check_routes(f, JL_MIX_AUTO, 1);
         check_routes(f, JL_MIX_AUTO, 0);
         check_routes(f, JL_MIX_GENERAL, 1);
@@ -1370,8 +1374,8 @@ static void break_mode(struct rig *r, int j, int code)
 
     for (i = 0; code == JL_ENONFINITE && i < in.n * in.n; i++)
         r->modes[j].F[i] = JL_REAL_MAX;
-    for (i = 0; code == JL_ESINGULAR && i < in.m; i++)
-        r->modes[j].R[i * (in.m + 1)] = -1.0e6f;
+    for (i = 0; code == JL_ESINGULAR && i < in.m * in.m; i += in.m + 1)
+        r->modes[j].R[i] = r->modes[j].V[i] = -1.0e6f;
 }
 
 /* twin never saw z. */
@@ -1433,7 +1437,7 @@ static void test_imm_failed_step_leaves_no_trace(void **state)
     int f;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         check_failures(f, JL_MIX_AUTO, 1);
         check_failures(f, JL_MIX_AUTO, 0);
         check_failures(f, JL_MIX_GENERAL, 1);

@@ -1,4 +1,4 @@
-/* The Kalman filter: both forms against the textbook in long double, and a
+/* The Kalman filter: every form against the textbook in long double, and a
  * filter that keeps its bits whenever a call fails. */
 #include "close.h"
 
@@ -13,7 +13,9 @@
 #define INF_ ((jl_real)INFINITY)
 #define EDGE 4
 
-static const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard };
+static const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard,
+                                           &jl_kf_sqrt };
+#define FORMS 3
 static uint32_t seed = 11;
 
 /* Uniform in [-1, 1). */
@@ -135,14 +137,29 @@ static void check_same(const struct rig *a, const struct rig *b)
     assert_same_bits(&a->loglik, &b->loglik, sizeof a->loglik);
 }
 
+/* The covariance of the estimate, which the form may keep otherwise. */
+static const jl_real *cov_of(const struct rig *r)
+{
+    static jl_real P[MAX * MAX];
+
+    jl_kf_cov(&r->kf, P);
+    return P;
+}
+
+/* Exactly symmetric; a factor has D >= 0 and zeros below. */
 static void check_symmetric(const struct rig *r)
 {
+    const jl_real *P = cov_of(r);
     int n = r->mode.n, i, j;
 
     for (i = 0; i < n; i++)
-        for (j = 0; j < i; j++)
-            assert_same_bits(&r->kf.P[i * n + j], &r->kf.P[j * n + i],
-                             sizeof(jl_real));
+        for (j = 0; j < i; j++) {
+            assert_same_bits(&P[i * n + j], &P[j * n + i], sizeof(jl_real));
+            if (r->kf.form->cov->factored)
+                assert_true(r->kf.P[i * n + j] == 0);
+        }
+    for (i = 0; i < n; i++)
+        assert_true(r->kf.P[i * (n + 1)] >= 0);
 }
 
 enum { PREDICT, UPDATE, STEP };
@@ -169,16 +186,17 @@ static int call(int what, const jl_real *z)
 
 typedef long double wide;
 
-static struct { wide x[SMALL], P[SMALL][SMALL], loglik; } book;
+static struct { wide x[SMALL], P[SMALL][SMALL], loglik, nis, nu[SMALL]; } book;
 
 static void book_start(const struct rig *r)
 {
+    const jl_real *P = cov_of(r);
     int n = r->mode.n, i, j;
 
     for (i = 0; i < n; i++) {
         book.x[i] = r->kf.x[i];
         for (j = 0; j < n; j++)
-            book.P[i][j] = r->kf.P[i * n + j];
+            book.P[i][j] = P[i * n + j];
     }
 }
 
@@ -234,9 +252,12 @@ static void book_update(const jl_mode *a, const jl_real *z)
                 for (f = S[i][k], j = 0; j < 2 * m; j++)
                     S[i][j] -= f * S[k][j];
     }
-    for (i = 0; i < m; i++)
+    for (i = 0; i < m; i++) {
+        book.nu[i] = nu[i];
         for (j = 0; j < m; j++)
             distance += nu[i] * S[i][m + j] * nu[j];
+    }
+    book.nis = distance;
     book.loglik = -(m * logl(2 * acosl(-1)) + logl(det) + distance) / 2;
     for (i = 0; i < n; i++)
         for (j = 0; j < m; j++)
@@ -252,12 +273,13 @@ static void book_update(const jl_mode *a, const jl_real *z)
 
 static void check_book(const struct rig *r, double tolerance)
 {
+    const jl_real *P = cov_of(r);
     int n = r->mode.n, i, j;
 
     for (i = 0; i < n; i++) {
         assert_close(r->kf.x[i], book.x[i], tolerance);
         for (j = 0; j < n; j++)
-            assert_close(r->kf.P[i * n + j], book.P[i][j], tolerance);
+            assert_close(P[i * n + j], book.P[i][j], tolerance);
     }
 }
 
@@ -351,7 +373,7 @@ static void test_kf_forms_are_the_textbook(void **state)
     int f, n, m, k, i;
 
     (void)state;
-    for (f = 0; f < 2; f++)
+    for (f = 0; f < FORMS; f++)
         for (n = 1; n <= SMALL; n++)
             for (m = 1; m <= SMALL; m += 1 + (n > 3)) {
                 make(&rig, forms[f], n, m);
@@ -369,6 +391,11 @@ static void test_kf_forms_are_the_textbook(void **state)
                     check_symmetric(&rig);
                     assert_close(rig.loglik, book.loglik,
                                  500 * EPS * (1 + fabs((double)book.loglik)));
+                    assert_close(rig.kf.innovation.nis, book.nis,
+                                 500 * EPS * (1 + (double)book.nis));
+                    for (i = 0; i < m; i++)
+                        assert_close(rig.kf.innovation.nu[i], book.nu[i],
+                                     500 * EPS);
                 }
             }
 }
@@ -380,7 +407,7 @@ static void test_kf_scalar_closed_form(void **state)
     int f;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make_scalar(&rig, forms[f], 2, 3, 4, 1, 5);
         assert_int_equal(call(PREDICT, NULL), JL_OK);
         assert_close(rig.kf.x[0], 2, 0);
@@ -401,14 +428,14 @@ static void test_kf_largest_sizes(void **state)
     int f, k, i;
 
     (void)state;
-    for (f = 0; f < 2; f++)
+    for (f = 0; f < FORMS; f++)
         for (k = 0; k < 3; k++) {
             make(&rig, forms[f], n[k], m[k]);
             for (i = 0; i < MAX; i++)
                 z[i] = rnd();
             assert_int_equal(call(STEP, z), JL_OK);
             check_symmetric(&rig);
-            assert_int_equal(jl_mat_check_cov(rig.kf.P, scratch, n[k]),
+            assert_int_equal(jl_mat_check_cov(cov_of(&rig), scratch, n[k]),
                              JL_OK);
         }
 }
@@ -460,7 +487,7 @@ static void test_kf_step_is_predict_and_update(void **state)
 
     (void)state;
     got.nu = nu;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make(&rig, forms[f], 4, 3);
         make_twin();
         for (k = 0; k < 50; k++) {
@@ -501,7 +528,7 @@ static void test_kf_scratch_means_nothing(void **state)
     int f, k, i;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make(&rig, forms[f], 3, 2);
         make_twin();
         for (k = 0; k < 20; k++) {
@@ -522,7 +549,7 @@ static void test_kf_missing_measurement(void **state)
     int f;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make(&rig, forms[f], 3, 2);
         make_twin();
         assert_int_equal(call(UPDATE, NULL), JL_OK);
@@ -544,7 +571,7 @@ static void test_kf_outlier(void **state)
     int f, i;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make(&rig, forms[f], 4, 2);
         z[0] = 1000;
         z[1] = -1000;
@@ -571,7 +598,7 @@ static void test_kf_refuses_measurements(void **state)
     int f, i, k;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make(&rig, forms[f], 4, 3);
         for (k = 0; k < 4; k++)
             for (i = 0; i < 3; i++) {
@@ -595,7 +622,7 @@ static void test_kf_refuses_z_beyond_large(void **state)
     int f;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make_scalar(&rig, forms[f], 1, 0, JL_LARGE, 0, 1);
         for (z = -2 * JL_LARGE; z <= 2 * JL_LARGE; z += 4 * JL_LARGE) {
             assert_int_equal(call(UPDATE, &z), JL_ENONFINITE);
@@ -617,7 +644,7 @@ static void test_kf_form_fails_alone(void **state)
 
     (void)state;
     got.nu = nu;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make(&rig, forms[f], 3, 2);
         memcpy(&before, &rig, sizeof rig);
         assert_int_equal(forms[f]->update(out, out + 3, &got, &rig.mode,
@@ -634,12 +661,12 @@ static void test_kf_singular(void **state)
     int f;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make_scalar(&rig, forms[f], 1, 0, 2, 1, 1);
-        rig.kf.P[0] = -10;              /* S < 0 */
+        rig.mode.R[0] = rig.mode.V[0] = -2;     /* S < 0 */
         assert_int_equal(call(UPDATE, &z), JL_ESINGULAR);
         assert_int_equal(call(STEP, &z), JL_ESINGULAR);
-        rig.kf.P[0] = -2;               /* S = 0 */
+        rig.mode.R[0] = rig.mode.V[0] = -1;     /* S = 0 */
         assert_int_equal(call(UPDATE, &z), JL_ESINGULAR);
         assert_int_equal(call(STEP, &z), JL_ESINGULAR);
         assert_int_equal(call(STEP, NULL), JL_OK);  /* none needs S */
@@ -647,12 +674,20 @@ static void test_kf_singular(void **state)
         assert_int_not_equal(call(UPDATE, &z), JL_OK);
         assert_int_not_equal(call(STEP, &z), JL_OK);
         assert_int_equal(call(PREDICT, NULL), JL_ENONFINITE);
-        /* two sensors that say the same, with R lost beside P in rounding */
+        /* two sensors that say the same, with R lost beside P in rounding:
+           only factors still know that P becomes R / 2 */
         make(&rig, forms[f], 1, 2);
         rig.kf.P[0] = rig.mode.H[0] = rig.mode.H[1] = 1;
         memset(rig.mode.R, 0, 4 * sizeof(jl_real));
+        memset(rig.mode.V, 0, 4 * sizeof(jl_real));
         rig.mode.R[0] = rig.mode.R[3] = JL_EPSILON / 16;
-        assert_int_equal(call(UPDATE, z2), JL_ESINGULAR);
+        rig.mode.V[0] = rig.mode.V[3] = JL_EPSILON / 16;
+        if (forms[f] == &jl_kf_sqrt) {
+            assert_int_equal(call(UPDATE, z2), JL_OK);
+            assert_close(rig.kf.P[0] / rig.mode.R[0], 0.5, 4 * EPS);
+        } else {
+            assert_int_equal(call(UPDATE, z2), JL_ESINGULAR);
+        }
     }
 }
 
@@ -662,7 +697,7 @@ static void test_kf_blow_up(void **state)
     int f;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make_scalar(&rig, forms[f], JL_LARGE, 1, 1, 2, 0);
         assert_int_equal(call(PREDICT, NULL), JL_ENONFINITE);   /* x */
         assert_int_equal(call(STEP, NULL), JL_ENONFINITE);

@@ -15,7 +15,9 @@ static const int sizes[] = { 1, 2, 3, 7, N };
 
 /* --- arrays whose edges are watched ------------------------------------- */
 
-static jl_real block[6][N * N + 2 * EDGE];
+#define ROOM (N * N + 2 * N)            /* the largest array of a test */
+
+static jl_real block[6][ROOM + 2 * EDGE];
 static uint32_t seed = 1;
 
 /* Uniform in [-1, 1). */
@@ -38,7 +40,7 @@ static jl_real *array(int k, int count)
 {
     int i;
 
-    fill(block[k], N * N + 2 * EDGE, (jl_real)NAN);
+    fill(block[k], ROOM + 2 * EDGE, (jl_real)NAN);
     for (i = 0; i < count; i++)
         block[k][EDGE + i] = rnd();
     return block[k] + EDGE;
@@ -327,6 +329,203 @@ static void test_mat_solves(void **state)
             check_solves(sizes[i], sizes[j]);
 }
 
+/* --- factors U' D U ------------------------------------------------------ */
+
+/* Element (i, j) of U' D U. */
+static long double ud_element(const jl_real *S, int n, int i, int j)
+{
+    long double sum = 0;
+    int k;
+
+    for (k = 0; k <= i && k <= j; k++)
+        sum += (long double)S[k * n + k] * (k == i ? 1 : S[k * n + i])
+            * (k == j ? 1 : S[k * n + j]);
+    return sum;
+}
+
+/* Finite, D >= 0, zeros below. */
+static void check_factor(const jl_real *S, int n)
+{
+    int i, j;
+
+    assert_true(jl_vec_within(S, n * n, JL_REAL_MAX));
+    for (i = 0; i < n; i++) {
+        assert_true(S[i * (n + 1)] >= 0);
+        for (j = 0; j < i; j++)
+            assert_true(S[i * n + j] == 0);
+    }
+}
+
+/* Factor A [n,n], whose lower triangle may hold anything: U' D U is A again,
+ * in units of sigma_i sigma_j, but for variances below JL_REAL_MIN.  In array
+ * 1. */
+static jl_real *check_ud(jl_real *A, int n, double tolerance)
+{
+    jl_real *S = array(1, n * n), *copy = array(2, n * n);
+    jl_real *work = array(3, n * n + 2 * n);
+    double none = sqrt((double)JL_REAL_MIN);
+    int i, j;
+
+    memcpy(copy, A, (size_t)(n * n) * sizeof *A);
+    fill(work, n * n + 2 * n, (jl_real)NAN);
+    jl_mat_ud(S, A, work, n);
+    assert_same_bits(A, copy, (size_t)(n * n) * sizeof *A);
+    check_edges(1, n * n);
+    check_edges(3, n * n + 2 * n);
+    check_factor(S, n);
+    for (i = 0; i < n; i++)
+        for (j = i; j < n; j++) {
+            double si = sqrt((double)A[i * (n + 1)]);
+            double sj = sqrt((double)A[j * (n + 1)]);
+
+            assert_close(ud_element(S, n, i, j) - (long double)A[i * n + j], 0,
+                         tolerance * si * sj + none * (si + sj + none));
+        }
+    jl_mat_ud(copy, copy, work, n);
+    assert_same_bits(copy, S, (size_t)(n * n) * sizeof *S);
+    return S;
+}
+
+/* Units of 1e-12 to 1e12 for the states. */
+static void change_units(jl_real *A, int n)
+{
+    int i, j;
+
+    for (i = 0; i < n; i++) {
+        jl_real unit = (jl_real)pow(10, i * 5 % 25 - 12);
+
+        for (j = 0; j < n; j++) {
+            A[i * n + j] *= unit;
+            A[j * n + i] *= unit;
+        }
+    }
+}
+
+static void test_mat_ud_every_size(void **state)
+{
+    jl_real *A;
+    int n, i, j, units;
+
+    (void)state;
+    for (n = 1; n <= N; n++)
+        for (units = 0; units < 2; units++) {
+            A = array(0, n * n);
+            make_cov(A, n, n, 1);
+            if (units)
+                change_units(A, n);
+            for (i = 0; i < n; i++)
+                for (j = 0; j < i; j++)
+                    A[i * n + j] = (jl_real)NAN;
+            check_ud(A, n, 4.0 * n * (double)JL_EPSILON);
+        }
+}
+
+/* Of every rank, also with states that are known exactly: what is left beyond
+ * the rank may be taken for rounding or not. */
+static void test_mat_ud_semidefinite(void **state)
+{
+    jl_real *A;
+    int n, rank, run, j;
+
+    (void)state;
+    for (run = 0; run < 20000; run++) {
+        n = 1 + run % 7;
+        rank = 1 + run / 7 % n;
+        A = array(0, n * n);
+        make_cov(A, n, rank, 0);
+        for (j = 0; j < n && run % 3 == 0; j++)
+            A[run / 9 % n * n + j] = A[j * n + run / 9 % n] = 0;
+        if (run % 2)
+            change_units(A, n);
+        check_ud(A, n, 128.0 * n * (double)JL_EPSILON);
+    }
+    A = array(0, N * N);
+    fill(A, N * N, 0);
+    check_ud(A, N, 0);
+    fill(A, N * N, 3);
+    check_ud(A, N, 0);
+}
+
+/* There is one such U and D: these. */
+static void test_mat_ud_is_unique(void **state)
+{
+    static const jl_real S[16] = { 2, 3, -1, 4,  0, 5, 7, -2,
+                                   0, 0, 1, JL_C(0.5),  0, 0, 0, 3 };
+    jl_real A[16], back[16], *got;
+    int i, j;
+
+    (void)state;
+    jl_mat_ud_product(A, S, 4);
+    for (i = 0; i < 4; i++)
+        for (j = 0; j < 4; j++)
+            assert_true(A[i * 4 + j] == (jl_real)ud_element(S, 4, i, j));
+    got = check_ud(A, 4, 16 * (double)JL_EPSILON);
+    for (i = 0; i < 16; i++)
+        assert_close(got[i], S[i], 4000 * (double)JL_EPSILON);
+    jl_mat_ud_product(back, got, 4);
+    for (i = 0; i < 16; i++)
+        assert_close(back[i], A[i], 400 * (double)JL_EPSILON);
+}
+
+/* Two states so alike that only a little above rounding tells them apart. */
+static void test_mat_ud_keeps_what_is_small(void **state)
+{
+    jl_real A[4] = { 1, 1, 1, 1 }, *S;
+
+    (void)state;
+    A[3] = 1 + 256 * JL_EPSILON;
+    S = check_ud(A, 2, 4 * (double)JL_EPSILON);
+    assert_close(S[3] / JL_EPSILON, 256, 4);
+    A[3] = 1 + 64 * JL_EPSILON;
+    S = check_ud(A, 2, 256 * (double)JL_EPSILON);
+    assert_true(S[3] == 0);
+}
+
+static void test_mat_ud_extreme_scales(void **state)
+{
+    const jl_real scales[] = { BIG, 1, JL_REAL_MIN };
+    jl_real A[9];
+    int a, b, c;
+
+    (void)state;
+    for (a = 0; a < 3; a++)
+        for (b = 0; b < 3; b++)
+            for (c = 0; c < 3; c++) {
+                fill(A, 9, 0);
+                A[0] = scales[a];
+                A[4] = scales[b];
+                A[8] = scales[c];
+                check_ud(A, 3, 0);
+                A[1] = (jl_real)(sqrt((double)A[0]) * sqrt((double)A[4]) / 2);
+                A[5] = (jl_real)(sqrt((double)A[4]) * sqrt((double)A[8]) / 2);
+                check_ud(A, 3, 64 * (double)JL_EPSILON);
+            }
+}
+
+static void test_mat_ud_product(void **state)
+{
+    jl_real *S, *P;
+    int n, i, j;
+
+    (void)state;
+    for (n = 1; n <= N; n++) {
+        S = array(0, n * n);
+        P = array(1, n * n);
+        for (i = 0; i < n; i++) {
+            S[i * (n + 1)] += 1;        /* D >= 0 */
+            for (j = 0; j < i; j++)
+                S[i * n + j] = (jl_real)NAN;    /* not read */
+        }
+        jl_mat_ud_product(P, S, n);
+        for (i = 0; i < n; i++)
+            for (j = i; j < n; j++)
+                assert_close(P[i * n + j], ud_element(S, n, i, j),
+                             2.0 * (n + 1) * (n + 1) * (double)JL_EPSILON);
+        check_symmetric(P, n);
+        check_edges(1, n * n);
+    }
+}
+
 /* --- symmetric ---------------------------------------------------------- */
 
 static void test_mat_pack_is_the_upper_triangle(void **state)
@@ -586,6 +785,12 @@ int main(void)
         cmocka_unit_test(test_mat_cholesky_every_size),
         cmocka_unit_test(test_mat_cholesky_refuses),
         cmocka_unit_test(test_mat_solves),
+        cmocka_unit_test(test_mat_ud_every_size),
+        cmocka_unit_test(test_mat_ud_semidefinite),
+        cmocka_unit_test(test_mat_ud_is_unique),
+        cmocka_unit_test(test_mat_ud_keeps_what_is_small),
+        cmocka_unit_test(test_mat_ud_extreme_scales),
+        cmocka_unit_test(test_mat_ud_product),
         cmocka_unit_test(test_mat_pack_is_the_upper_triangle),
         cmocka_unit_test(test_mat_pack_every_size),
         cmocka_unit_test(test_mat_within),

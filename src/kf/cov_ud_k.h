@@ -1,0 +1,75 @@
+/* Kernels of sums over estimates that keep factors, written once, with the
+ * sizes as last arguments.  The contract is kf.h's (jl_cov).  A sum is the
+ * factor of all rows together: it only adds, so no difference of scales can make
+ * it indefinite. */
+#ifndef JL_COV_UD_K_H
+#define JL_COV_UD_K_H
+
+#include "kf/cov_k.h"
+#include "mat/ud_k.h"
+
+/* S = w S1; may be S1 */
+JL_INLINE void jli_ud_scale(jl_real *S, const jl_real *S1, jl_real w, int n)
+{
+    int k;
+
+    if (S != S1)
+        jli_copy(S, S1, n * n);
+    for (k = 0; k < n; k++)
+        S[k * (n + 1)] *= w;
+}
+
+/* S = S + w S1, row by row; v [n]                                   n^3 / 2 */
+JL_INLINE void jli_ud_add(jl_real *S, jl_real w, const jl_real *S1,
+                          jl_real *v, int n)
+{
+    int k, j;
+
+    for (k = 0; k < n; k++) {
+        v[k] = 1;
+        for (j = k + 1; j < n; j++)
+            v[j] = S1[k * n + j];
+        jli_ud_absorb(S, v, w * S1[k * n + k], k, n);
+    }
+}
+
+JL_INLINE int jli_heaviest(const jl_real *w, int M)
+{
+    int i, best = 0;
+
+    for (i = 1; i < M; i++)
+        if (w[i] > w[best])
+            best = i;
+    return best;
+}
+
+/* The heaviest comes first and costs nothing. */
+JL_INLINE void jli_ud_pool(jl_real *mean, jl_real *S, const jl_real *w,
+                           const jl_real *x, const jl_real *Ss, jl_real *v,
+                           int M, int n)
+{
+    int first = jli_heaviest(w, M), i, a;
+
+    jli_mean(mean, w, x, M, n);
+    jli_ud_scale(S, Ss + first * n * n, w[first], n);
+    for (i = 0; i < M; i++) {
+        if (i != first)
+            jli_ud_add(S, w[i], Ss + i * n * n, v, n);
+        for (a = 0; a < n; a++)
+            v[a] = x[i * n + a] - mean[a];
+        jli_ud_absorb(S, v, w[i], 0, n);
+    }
+}
+
+JL_INLINE void jli_ud_blend(jl_real *x, jl_real *S, jl_real a,
+                            const jl_real *x1, const jl_real *S1, jl_real b,
+                            const jl_real *x2, const jl_real *S2, jl_real *d,
+                            int n)
+{
+    jli_between(x, d, a, x1, b, x2, n);
+    jli_ud_scale(S, S1, a, n);
+    jli_ud_add(S, b, S2, d + n, n);
+    jli_ud_absorb(S, d, a * b, 0, n);
+}
+
+#endif
