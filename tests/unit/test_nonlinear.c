@@ -23,7 +23,9 @@ static const struct {
     int jacobians;
 } forms[] = {
     { &jl_kf_joseph, 1 },
-    { &jl_kf_standard, 1 }
+    { &jl_kf_standard, 1 },
+    { &jl_kf_sqrt, 1 },
+    { &jl_kf_unscented, 0 }
 };
 enum { FORMS = sizeof forms / sizeof *forms };
 
@@ -491,7 +493,7 @@ static void test_nonlinear_halves(void **state)
 
 static void test_nonlinear_model_may_be_set_anew(void **state)
 {
-    jl_motion motion = { JL_MOTION_CV, 2, 2, 1, 0, 20 };
+    jl_motion motion = { JL_MOTION_CV, 2, 2, 1, 0, 20, 0 };
     jl_mode *a = &rig.modes[0];
     jl_real F[16], mem[JL_MODE_MEM(4, 2, 2)], q[4] = { 1, 0, 0, 1 };
     jl_real G[8] = { 1, 0, 0, 1, 1, 0, 0, 1 }, H[8] = { 1, 0, 0, 0, 0, 0, 1, 0 };
@@ -630,7 +632,7 @@ static void test_nonlinear_jacobian_h_by_differences(void **state)
 static int bearing(jl_real *z, const jl_real *x, void *context)
 {
     (void)context;
-    z[0] = (jl_real)atan2((double)x[1], (double)x[0]);
+    z[0] = jl_atan2(x[1], x[0]);
     return JL_OK;
 }
 
