@@ -88,13 +88,13 @@ typedef struct jl_nonlinear {
     int (*h)(jl_real *z, const jl_real *x, void *context);
     /* H [m,n] = dh/dx at x; NULL: by central differences */
     int (*jacobian_h)(jl_real *H, const jl_real *x, void *context);
-    /* d [m] = a - b, with angles brought to [-pi, pi); d may be a or b.  NULL:
-     * the plain difference. */
+    /* d [m] = a - b, with angles brought to [-pi, pi), of measurements or of
+     * differences; d may be a or b.  NULL: the plain difference. */
     void (*residual)(jl_real *d, const jl_real *a, const jl_real *b,
                      void *context);
     void *context;
-    jl_real kappa;              /* >= 0: spread of the sigma points of the form
-                                   unscented (kf.h); 0 for the others       */
+    jl_real kappa;              /* >= 0, usually 0: spread of the points of the
+                                   form unscented (kf.h)                    */
 } jl_nonlinear;
 
 /* Make a mode, which has its noises by jl_mode_set or jl_mode_motion,

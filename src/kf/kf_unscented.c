@@ -237,11 +237,12 @@ static int update(jl_real *x, jl_real *S, jl_innovation *innovation,
     if (status != JL_OK)
         return status;
     jli_copy(nu, z, m);
-    status = subtract(nu, &h, v);               /* z - y0 - shift */
-    jli_copy(V, mode->V, m * m);
-    bend(V, v, b, &h);
-    if (status == JL_OK)
-        status = subtract(nu, &h, v);
+    status = subtract(nu, &h, v);               /* z - y0 ... */
+    if (status == JL_OK) {
+        jli_copy(V, mode->V, m * m);
+        bend(V, v, b, &h);
+        status = subtract(nu, &h, v);           /* ... - shift */
+    }
     if (status != JL_OK)
         return status;
     join(T, V, a, &h, Sp, v);

@@ -103,9 +103,11 @@ static void update(struct rig *r, const jl_real *z)
 
 /* --- closed forms --------------------------------------------------------- */
 
+/* context: counts the calls, or NULL */
 static int square(jl_real *y, const jl_real *x, void *context)
 {
-    (void)context;
+    if (context != NULL)
+        ++*(int *)context;
     y[0] = x[0] * x[0];
     return JL_OK;
 }
@@ -427,6 +429,21 @@ static void test_unscented_without_variance(void **state)
                  16 * EPS);
 }
 
+/* A pair of points costs two calls, but not where it is one point. */
+static void test_unscented_calls(void **state)
+{
+    const jl_real x[3] = { 1, 2, 3 }, P[9] = { 4, 0, 0, 0, 0, 0, 0, 0, 9 };
+    const jl_real z = 1;
+    jl_nonlinear how = sees_square;
+    int calls = 0;
+
+    (void)state;
+    how.context = &calls;
+    make(&rig, &jl_kf_unscented, 3, 1, x, P, 0, 1, &how);
+    update(&rig, &z);
+    assert_int_equal(calls, 1 + 2 * 2);
+}
+
 static int squares_2(jl_real *y, const jl_real *x, void *context)
 {
     (void)context;
@@ -541,6 +558,76 @@ static void test_unscented_keeps_semidefinite(void **state)
     }
 }
 
+/* --- what is refused ------------------------------------------------------ */
+
+static int constant(jl_real *y, const jl_real *x, void *context)
+{
+    (void)x;
+    y[0] = *(const jl_real *)context;
+    return JL_OK;
+}
+
+static int quarter(jl_real *y, const jl_real *x, void *context)
+{
+    (void)context;
+    y[0] = x[0] / 4;
+    return JL_OK;
+}
+
+static int refuses(const jl_real *z)
+{
+    jl_real x = rig.kf.x[0], S = rig.kf.P[0], nu = rig.kf.innovation.nu[0];
+    int status = z != NULL ? jl_kf_update(&rig.kf, NULL, z, spoilt(&rig))
+        : jl_kf_predict(&rig.kf, spoilt(&rig));
+
+    assert_true(status == JL_OK || (rig.kf.x[0] <= x && rig.kf.x[0] >= x));
+    assert_true(status == JL_OK || (rig.kf.P[0] <= S && rig.kf.P[0] >= S));
+    assert_true(status == JL_OK || (rig.kf.innovation.nu[0] <= nu
+                                    && rig.kf.innovation.nu[0] >= nu));
+    return status;
+}
+
+static void test_unscented_refuses(void **state)
+{
+    const jl_real zero = 0, one = 1, large = JL_LARGE, half = JL_LARGE / 2;
+    const jl_real var = JL_LARGE * JL_LARGE / 20, small = JL_REAL_MIN * 4;
+    const jl_real bad[] = { NAN_, 2 * JL_LARGE, -2 * JL_LARGE };
+    jl_nonlinear how = { constant, NULL, constant, NULL, NULL, NULL, 0 };
+    jl_real c = 0;
+    int i;
+
+    (void)state;
+    how.context = &c;
+    /* the prediction's variance is beyond, though no value is */
+    make(&rig, &jl_kf_unscented, 1, 1, &zero, &var, 1, 1, &how);
+    rig.mode.q[0] = 2 * JL_LARGE * JL_LARGE;
+    assert_int_equal(refuses(NULL), JL_ENONFINITE);
+    /* ... or its mean: f(x) + u */
+    c = JL_LARGE;
+    make(&rig, &jl_kf_unscented, 1, 1, &zero, &one, 1, 1, &how);
+    rig.mode.u[0] = JL_LARGE;
+    assert_int_equal(refuses(NULL), JL_ENONFINITE);
+    /* measurements that are none */
+    c = 0;
+    for (i = 0; i < 3; i++) {
+        make(&rig, &jl_kf_unscented, 1, 1, &zero, &one, 1, large, &how);
+        assert_int_equal(refuses(&bad[i]), JL_ENONFINITE);
+    }
+    /* S = 0 */
+    make(&rig, &jl_kf_unscented, 1, 1, &zero, &one, 1, 1, &how);
+    rig.mode.R[0] = rig.mode.V[0] = 0;
+    assert_int_equal(refuses(&one), JL_ESINGULAR);
+    /* loglik = -z^2 / 2 R */
+    make(&rig, &jl_kf_unscented, 1, 1, &zero, &one, 1, small, &how);
+    assert_int_equal(refuses(&large), JL_ENONFINITE);
+    /* x = 4 z */
+    how.h = quarter;
+    make(&rig, &jl_kf_unscented, 1, 1, &zero, &large, 1, 1, &how);
+    assert_int_equal(refuses(&large), JL_ENONFINITE);
+    assert_int_equal(refuses(&half), JL_ENONFINITE);
+    assert_int_equal(refuses(&one), JL_OK);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -551,9 +638,11 @@ int main(void)
         cmocka_unit_test(test_unscented_matrices_are_sqrt),
         cmocka_unit_test(test_unscented_linear_functions),
         cmocka_unit_test(test_unscented_without_variance),
+        cmocka_unit_test(test_unscented_calls),
         cmocka_unit_test(test_unscented_rank_one),
         cmocka_unit_test(test_unscented_angles_wrap),
         cmocka_unit_test(test_unscented_keeps_semidefinite),
+        cmocka_unit_test(test_unscented_refuses),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
