@@ -86,7 +86,8 @@ static void compare(const struct par_shape *shape)
 
 static void test_par_gives_serial_bits_over_lcm_and_topologies(void **state)
 {
-    struct par_shape s = { 0, PAR_M, 0, &jl_kf_joseph, 0, 0, 0, -1 };
+    struct par_shape s = { .M = PAR_M, .form = &jl_kf_joseph,
+                           .hangs_at = -1 };
 
     (void)state;
     if (!is_private)

@@ -98,6 +98,27 @@ static void test_par_gives_serial_bits_for_any_pes_and_topology(void **state)
             compare_all(&run);
 }
 
+static void test_par_gives_serial_bits_with_functions(void **state)
+{
+    static const jl_kf_form *const forms[] = {
+        &jl_kf_joseph, &jl_kf_standard, &jl_kf_sqrt, &jl_kf_unscented
+    };
+    static struct run run = { .shape = { .hangs_at = -1, .nonlinear = 1 } };
+    struct par_shape *s = &run.shape;
+    int f;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 1; s->npe <= 5; s->npe++)
+            for (s->sticky = 0; s->sticky < 2; s->sticky++)
+                for (f = 0; f < 4; f++) {
+                    s->form = forms[f];
+                    compare(&run, s->npe % 3);
+                }
+}
+
 static void test_par_gives_serial_bits_on_sixteen_pes(void **state)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
@@ -241,7 +262,7 @@ static void test_par_blames_the_dead_and_not_the_relay(void **state)
 #define REFUSALS 9
 
 static const struct par_shape one_pe = {
-    1, 3, 1, &jl_kf_joseph, JL_TOPO_FULL, JL_EXCHANGE_GATHER, 0, -1
+    .npe = 1, .M = 3, .sticky = 1, .form = &jl_kf_joseph, .hangs_at = -1
 };
 
 struct refusal {
@@ -334,7 +355,7 @@ static void test_par_refuses_bad_measurements_with_a_code(void **state)
 /* --- a PE1 that says what does not belong here --------------------------- */
 
 static const struct par_shape two_pes = {
-    2, 3, 1, &jl_kf_joseph, JL_TOPO_FULL, JL_EXCHANGE_GATHER, 0, -1
+    .npe = 2, .M = 3, .sticky = 1, .form = &jl_kf_joseph, .hangs_at = -1
 };
 
 #define MODES_LEN (8 + 2 + (1 + PAR_N + JL_PACKED(PAR_N)) * JL_REAL_OCTETS)
@@ -491,6 +512,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_for_any_pes_and_topology),
+        cmocka_unit_test(test_par_gives_serial_bits_with_functions),
         cmocka_unit_test(test_par_gives_serial_bits_on_sixteen_pes),
         cmocka_unit_test(test_par_leaves_spare_pes_idle),
         cmocka_unit_test(test_par_reduce_equals_serial_up_to_rounding),
