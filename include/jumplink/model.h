@@ -188,6 +188,16 @@ int jl_motion_start(jl_real *x, jl_real *P, const jl_motion *motion,
 /* Transition probabilities over dt [s] >= 0 from mean dwell times:
  *     Pi[i][i] = exp(-dt / sojourn_s[i]), the rest of row i shared evenly
  * Pi [M,M], sojourn_s [M] > 0.  With one mode Pi = 1.
+ *
+ * This is one jump at most: what leaves within dt does not come back.  Exact is
+ * the exponential of the rates, in which it does; the difference is of second
+ * order in dt.  Two modes of 20 s stay with 0.951 over 1 s, where 0.952 is
+ * exact; 0.607 over 10 s, 0.684 exact; but 0.000 over 957 s, 0.500 exact, so
+ * after a long gap they change places, and only small steps go to the
+ * stationary distribution, sojourn_s / sum of sojourn_s.  Those are Pi(dt/k)^k
+ * by jl_mat_mul, or better, as the motions are mixed too, k steps without a
+ * measurement.  With steps h of up to an eighth of the shortest sojourn Pi is
+ * within a tenth of h / that sojourn of the exponential.
  * Returns JL_OK, JL_EDIM, JL_ENONFINITE, JL_ERANGE (a sojourn <= 0), JL_ETIME
  * (dt < 0); Pi is untouched on error. */
 int jl_chain_sojourn(jl_real *Pi, const jl_real *sojourn_s, int M,

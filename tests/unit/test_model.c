@@ -797,6 +797,117 @@ static void test_chain_sojourn(void **state)
     assert_true(Pi[0] == 0 && Pi[1] == JL_C(0.5) && Pi[2] == JL_C(0.5));
 }
 
+/* E = A E, or with A NULL E E */
+static void times(long double *E, const long double *A, int M)
+{
+    long double old[36];
+    int i, j, k;
+
+    memcpy(old, E, sizeof old);
+    for (i = 0; i < M; i++)
+        for (j = 0; j < M; j++)
+            for (E[i * M + j] = 0, k = 0; k < M; k++)
+                E[i * M + j] += (A != NULL ? A : old)[i * M + k]
+                    * old[k * M + j];
+}
+
+/* exp(dt G) of the rates G, by Taylor's series and squaring. */
+static void exponential(long double *E, const jl_real *sojourn_s, int M,
+                        long double dt)
+{
+    long double G[36], h = dt;
+    int i, k, squarings = 0;
+
+    for (; h > 0.01L; h /= 2)
+        squarings++;
+    for (i = 0; i < M * M; i++) {
+        G[i] = 1 / (long double)sojourn_s[i / M]
+            * (i % (M + 1) == 0 ? -1 : 1.0L / (M - 1));
+        E[i] = i % (M + 1) == 0;
+    }
+    for (k = 12; k > 0; k--) {          /* E = I + h G / k E */
+        times(E, G, M);
+        for (i = 0; i < M * M; i++)
+            E[i] = E[i] * h / k + (i % (M + 1) == 0);
+    }
+    for (; squarings > 0; squarings--)
+        times(E, NULL, M);
+}
+
+/* Pi(dt/k)^k for k = 2^doublings. */
+static void small_steps(jl_real *to, const jl_real *sojourn_s, int M,
+                        jl_real dt, int doublings)
+{
+    jl_real half[36];
+
+    assert_int_equal(jl_chain_sojourn(to, sojourn_s, M, dt / (jl_real)(
+        1 << doublings)), JL_OK);
+    for (; doublings > 0; doublings--) {
+        memcpy(half, to, sizeof half);
+        jl_mat_mul(to, half, half, M, M, M);
+    }
+}
+
+/* How far from the exponential in its worst element. */
+static double off_exponential(const jl_real *sojourn_s, int M, jl_real dt,
+                              int doublings)
+{
+    jl_real steps[36] = { 0 };
+    long double E[36] = { 0 }, worst = 0;
+    int i;
+
+    exponential(E, sojourn_s, M, dt);
+    small_steps(steps, sojourn_s, M, dt, doublings);
+    for (i = 0; i < M * M; i++)
+        if (fabsl(steps[i] - E[i]) > worst)
+            worst = fabsl(steps[i] - E[i]);
+    return (double)worst;
+}
+
+/* The header's numbers, and what it says of small steps. */
+static void test_chain_sojourn_leaves_out_returns(void **state)
+{
+    static const jl_real chains[3][6] = {
+        { 20, 20 }, { 60, 10, 20, 20 }, { 30, 5, 8, 100, 9, 12 }
+    };
+    static const jl_real dts[] = { 1, 7, 10, 60, 957 };
+    static const double stays[][3] = {
+        { 1, 0.951, 0.952 }, { 10, 0.607, 0.684 }, { 957, 0, 0.5 }
+    };
+    long double E[36] = { 0 }, sum = 0;
+    jl_real steps[36] = { 0 };
+    int c, k, r, i;
+
+    (void)state;
+    for (k = 0; k < 3; k++) {
+        exponential(E, chains[0], 2, stays[k][0]);
+        assert_close(E[0], 0.5 + 0.5 * exp(-stays[k][0] / 10), 1e-14);
+        assert_close(E[0], stays[k][2], 0.0005);
+        assert_int_equal(jl_chain_sojourn(Pi, chains[0], 2,
+                                          (jl_real)stays[k][0]), JL_OK);
+        assert_close(Pi[0], stays[k][1], 0.0005);
+    }
+    for (c = 0; c < 3; c++)
+        for (k = 0; k < 5; k++) {
+            const int M = 2 + 2 * c;
+            const double shortest = c == 0 ? 20 : c == 1 ? 10 : 5;
+
+            for (r = 0; r < 11; r++) {
+                const double h = (double)dts[k] / (1 << r) / shortest;
+
+                if (h < 0.125)
+                    assert_true(off_exponential(chains[c], M, dts[k], r)
+                                < h / 10 + 2 * (1 << r) * EPS);
+            }
+        }
+    for (i = 0; i < 6; i++)             /* to the stationary distribution */
+        sum += chains[2][i];
+    small_steps(steps, chains[2], 6, 957, 14);
+    for (i = 0; i < 36; i++)
+        assert_close(steps[i], chains[2][i % 6] / sum,
+                     957.0 / 16384 / 5 / 10 + 2 * 16384 * EPS);
+}
+
 static int sojourn_status(int M, int which, jl_real value, jl_real dt)
 {
     static const jl_real chain[9] = { 9, 8, 7, 6, 5, 4, 3, 2, 1 };
@@ -898,6 +1009,7 @@ int main(void)
         cmocka_unit_test(test_start_state),
         cmocka_unit_test(test_start_refuses),
         cmocka_unit_test(test_chain_sojourn),
+        cmocka_unit_test(test_chain_sojourn_leaves_out_returns),
         cmocka_unit_test(test_chain_sojourn_refuses),
         cmocka_unit_test(test_chain_check),
     };
