@@ -45,7 +45,8 @@ sim              * lcm/lcm.h jansson.h
 tests            * lcm/lcm.h jansson.h cmocka.h
 '
 
-find include src port sim tests -name '*.[ch]' | sort |
+# .inc, .def: included, and more than once, with other definitions.
+find include src port sim tests -name '*.[ch]' -o -name '*.inc' -o -name '*.def' | sort |
 TOPICS=$topics FOLDERS=$folders SYSTEM=$system awk '
 function complain(text) { print at ": " text; bad++ }
 

@@ -61,7 +61,7 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
 
     memset(P, 0, sizeof P);
     for (j = 0; j < M; j++) {
-        jl_motion motion = { JL_MOTION_CT, 2, 2, JL_C(0.5), 0, 20 };
+        jl_motion motion = { JL_MOTION_CT, 2, 2, JL_C(0.5), 0, 20, 0 };
 
         motion.turn_rate = JL_C(0.02) * (jl_real)(j - M / 2);
         motion.accel_std = JL_C(0.3) * (jl_real)(j + 1);

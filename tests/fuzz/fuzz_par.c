@@ -166,7 +166,7 @@ static void bank_init(struct bank *bank, int sticky)
         JL_C(0.9), JL_C(0.05), JL_C(0.05), JL_C(0.1), JL_C(0.8), JL_C(0.1),
         JL_C(0.2), JL_C(0.1), JL_C(0.7)
     };
-    jl_motion motion = { JL_MOTION_CV, Z, N, 0, 0, 2 };
+    jl_motion motion = { JL_MOTION_CV, Z, N, 0, 0, 2, 0 };
     jl_real x[M * N], P[M * N * N], zero = 0;
     int j;
 

@@ -443,7 +443,7 @@ static void test_kf_largest_sizes(void **state)
 /* A sensor nearly as good as rounding allows, on a prior of 1, for long. */
 static void test_kf_joseph_keeps_semidefinite(void **state)
 {
-    jl_motion motion = { JL_MOTION_CA, 2, 3, 1, 0, 0 };
+    jl_motion motion = { JL_MOTION_CA, 2, 3, 1, 0, 0, 0 };
     jl_real x[6], P[36], z[2] = { 0, 0 };
     int k;
 
