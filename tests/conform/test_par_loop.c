@@ -98,6 +98,27 @@ static void test_par_gives_serial_bits_for_any_pes_and_topology(void **state)
             compare_all(&run);
 }
 
+static void test_par_gives_serial_bits_with_functions(void **state)
+{
+    static const jl_kf_form *const forms[] = {
+        &jl_kf_joseph, &jl_kf_standard, &jl_kf_sqrt, &jl_kf_unscented
+    };
+    static struct run run = { .shape = { .hangs_at = -1, .nonlinear = 1 } };
+    struct par_shape *s = &run.shape;
+    int f;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 1; s->npe <= 5; s->npe++)
+            for (s->sticky = 0; s->sticky < 2; s->sticky++)
+                for (f = 0; f < 4; f++) {
+                    s->form = forms[f];
+                    compare(&run, s->npe % 3);
+                }
+}
+
 static void test_par_gives_serial_bits_on_sixteen_pes(void **state)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
@@ -569,6 +590,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_for_any_pes_and_topology),
+        cmocka_unit_test(test_par_gives_serial_bits_with_functions),
         cmocka_unit_test(test_par_gives_serial_bits_on_sixteen_pes),
         cmocka_unit_test(test_par_leaves_spare_pes_idle),
         cmocka_unit_test(test_par_gate_gives_serial_bits),

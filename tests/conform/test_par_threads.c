@@ -74,11 +74,26 @@ static void test_par_gate_gives_serial_bits_on_threads(void **state)
     compare_all(1);
 }
 
+static void test_par_gives_serial_bits_with_functions(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .nonlinear = 1 } };
+    struct par_shape *s = &run.shape;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->npe = 1; s->npe <= 8; s->npe++) {
+        s->form = s->npe % 2 ? &jl_kf_unscented : &jl_kf_joseph;
+        compare(&run, 1);
+        s->sticky = !s->sticky;
+    }
+}
+
 int main(void)
 {
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_on_threads),
         cmocka_unit_test(test_par_gate_gives_serial_bits_on_threads),
+        cmocka_unit_test(test_par_gives_serial_bits_with_functions),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
