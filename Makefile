@@ -248,7 +248,7 @@ install: all
 	mkdir -p $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include/jumplink $(DESTDIR)$(PREFIX)/bin
 	cp $(BUILD)/libjumplink.a $(BUILD)/libjumplink_f32.a $(DESTDIR)$(PREFIX)/lib/
 	cp include/jumplink.h $(DESTDIR)$(PREFIX)/include/
-	cp include/jumplink/*.h $(DESTDIR)$(PREFIX)/include/jumplink/
+	cp include/jumplink/*.h include/jumplink/*.def $(DESTDIR)$(PREFIX)/include/jumplink/
 	$(if $(PROGRAMS),cp $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin/)
 
 clean:
