@@ -59,7 +59,7 @@ static jl_real *reals(int count)
  * differ in how hard they manoeuvre. */
 static jl_motion motion_of(int n, int j)
 {
-    jl_motion motion = { JL_MOTION_CV, 3, 2, JL_C(0.2), 0, 20 };
+    jl_motion motion = { JL_MOTION_CV, 3, 2, JL_C(0.2), 0, 20, 0 };
 
     motion.accel_std *= (jl_real)(j + 1);
     if (n == 3) {
