@@ -1,6 +1,6 @@
 /* Modes given by functions: Jacobians, angles, and that whatever a function
- * says or computes, a step is done or nothing has changed.  The tests of filters
- * run over every form. */
+ * says or computes, a step is done or nothing has changed.  The tests of
+ * filters run over every form. */
 #include "close.h"
 
 #include <stdint.h>
@@ -496,7 +496,8 @@ static void test_nonlinear_model_may_be_set_anew(void **state)
     jl_motion motion = { JL_MOTION_CV, 2, 2, 1, 0, 20, 0 };
     jl_mode *a = &rig.modes[0];
     jl_real F[16], mem[JL_MODE_MEM(4, 2, 2)], q[4] = { 1, 0, 0, 1 };
-    jl_real G[8] = { 1, 0, 0, 1, 1, 0, 0, 1 }, H[8] = { 1, 0, 0, 0, 0, 0, 1, 0 };
+    jl_real G[8] = { 1, 0, 0, 1, 1, 0, 0, 1 };
+    jl_real H[8] = { 1, 0, 0, 0, 0, 0, 1, 0 };
 
     (void)state;
     make(&rig, &jl_kf_joseph, 4, 2);
