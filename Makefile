@@ -86,6 +86,10 @@ $(BUILD)/obj/%.o: %.c $(BUILD)/flags
 $(BUILD)/obj_f32/%.o: %.c $(BUILD)/flags
 	$(call compile,$(HOST) $(FLOAT))
 
+# Fixed sizes gain by unrolling; in sections, since each program wants its own.
+SIZES := %/src/kf/kf_sizes.o
+$(SIZES): private CFLAGS += -O3 -ffunction-sections -fdata-sections
+
 # Two notes that change only when what they say changes, so that other flags
 # or a source that is gone also rebuild what they concern.
 $(BUILD)/flags: NOTE = $(CC) $(CORE) $(HOST) $(CFLAGS)
@@ -212,11 +216,29 @@ $(BENCHES): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o \
     $(BUILD)/libsim.a $(BUILD)/libports.a $(BUILD)/libjumplink.a
 	@mkdir -p $(@D); echo '  $@'; $(CC) $(CFLAGS) -pthread $^ $(LIBS) -o $@
 
+# Steps of fixed sizes beside Eigen: everybody's filters compiled for this
+# machine, the others' also with fused multiply-adds, which the library does
+# without for the sake of its bits.
+NATIVE := -O3 -march=native
+$(BUILD)/native/libjumplink.a: $(CORE_SRC:%.c=$(BUILD)/native/%.o)
+$(BUILD)/native/%: private CFLAGS += $(NATIVE)
+$(BUILD)/native/src/%.o: src/%.c $(BUILD)/flags
+	$(call compile,$(CORE))
+$(BUILD)/native/%.o: %.c $(BUILD)/flags
+	$(call compile,$(HOST) -ffp-contract=fast)
+$(BUILD)/native/%.o: %.cc $(BUILD)/flags
+	@mkdir -p $(@D); echo '  $@'; \
+	    $(CXX) -std=c++17 -Wall -Wextra -Iinclude -DNDEBUG -fno-math-errno $(CFLAGS) -MMD -MP -c $< -o $@
+$(BUILD)/bench/bench_sizes: $(patsubst %,$(BUILD)/native/tests/bench/%.o,bench_sizes sizes_jumplink sizes_plain sizes_eigen) \
+    $(BUILD)/obj/tests/bench/bench_samples.o $(BUILD)/libsim.a $(BUILD)/native/libjumplink.a
+	@mkdir -p $(@D); echo '  $@'; $(CXX) $(CFLAGS) -pthread $^ $(LIBS) -o $@
+
 bench: deps
+	@CC='$(CC)' sh tests/check/deps.sh bench
 	$(AGAIN) run-bench
 
-run-bench: $(BENCHES)
-	@for b in $(BENCHES); do $$b $(BUILD)/bench || exit 1; done
+run-bench: $(BENCHES) $(BUILD)/bench/bench_sizes
+	@for b in $^; do $$b $(BUILD)/bench || exit 1; done
 	@cd $(BUILD)/bench && gnuplot '$(CURDIR)/tests/bench/latency.gp' '$(CURDIR)/tests/bench/break_even.gp'
 	@echo 'CSV and plots: $(BUILD)/bench'
 

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "complain.h"
+#include "jumplink/kf.h"
 #include "out_file.h"
 
 /* From count to more numbers, the new ones NaN.  All NaNs have the same bits,
@@ -85,6 +86,12 @@ void estimates_note(struct estimates *e, long row, const jl_real *x,
     e->loglik[row] = loglik;
     e->us[row] = us;
     e->done = row + 1;
+}
+
+void estimates_judge(struct estimates *e, int verdict)
+{
+    e->judged += verdict != JL_MISSING;
+    e->rejected += verdict == JL_REJECTED;
 }
 
 static int same(const jl_real *a, const jl_real *b, long count)

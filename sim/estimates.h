@@ -10,6 +10,7 @@
 struct estimates {
     long rows, room;            /* of rows there is memory for `room`       */
     long done;                  /* behind the last with an estimate         */
+    long judged, rejected;      /* measurements, and those the gate rejected */
     int n, M;
     jl_real *x;                 /* [rows,n]; NaN in rows without estimate   */
     jl_real *P;                 /* [rows,n,n]                               */
@@ -31,6 +32,9 @@ void estimates_close(struct estimates *e);
 void estimates_note(struct estimates *e, long row, const jl_real *x,
                     const jl_real *P, const jl_real *mu, jl_real loglik,
                     double us);
+
+/* Count a measurement by its verdict (kf.h). */
+void estimates_judge(struct estimates *e, int verdict);
 
 /* 1 if all numbers of both have the same bits (times apart). */
 int estimates_same(const struct estimates *a, const struct estimates *b);

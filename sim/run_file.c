@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 
+#include "complain.h"
 #include "out_file.h"
 #include "progress.h"
 #include "run.h"
@@ -31,6 +32,9 @@ static int run_data(const struct model *model, const struct data_file *data,
     progress_begin(data->path);
     status = run(&e, &traffic, model, data, options);
     progress_begin(NULL);
+    if (status == 0 && options->gate > 0)
+        complain(data->path, 0, NULL, "the gate rejected %ld of %ld "
+                 "measurements", e.rejected, e.judged);
     if (status == 0)
         status = estimates_save(&e, data, options->out) == 0 ? 0 : 1;
     else

@@ -23,8 +23,13 @@ struct par_shape {
     int hangs;                  /* this PE falls asleep ...                 */
     int hangs_at;               /* ... at this measurement; 0: at once; -1:
                                    nobody does                              */
+    int gate;                   /* a gate, and bursts of outliers           */
     int nonlinear;              /* two of three modes are                   */
 };
+
+static const jl_kf_form *const par_forms[] = { &jl_kf_joseph, &jl_kf_standard,
+                                               &jl_kf_sqrt };
+#define PAR_FORMS 3
 
 #define PAR_ASLEEP_US 1000000000L
 
@@ -45,6 +50,7 @@ struct par_bank {
 /* What a run gives, step by step. */
 struct par_trace {
     int status[PAR_STEPS];
+    int verdict[PAR_STEPS];
     jl_real x[PAR_STEPS][PAR_N];
     jl_real P[PAR_STEPS][PAR_N * PAR_N];
     jl_real mu[PAR_STEPS][PAR_MOST];
@@ -89,6 +95,21 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
     assert_int_equal(jl_imm_chain(&bank->imm, bank->Pi), 0);
     assert_int_equal(bank->imm.sticky, sticky || M <= 2);
     assert_int_equal(jl_imm_set(&bank->imm, x, P, mu, bank->scratch), 0);
+}
+
+/* A gate; where that is allowed, nobody enters the last mode. */
+static inline void par_bank_gate(struct par_bank *bank, int sticky)
+{
+    int M = bank->imm.M, i;
+
+    for (i = 0; !sticky && M > 2 && i < M; i++) {
+        jl_real *row = bank->Pi + i * M;
+
+        row[i < M - 1 ? i : 0] += row[M - 1];
+        row[M - 1] = 0;
+    }
+    assert_int_equal(jl_imm_chain(&bank->imm, bank->Pi), 0);
+    assert_int_equal(jl_imm_gate(&bank->imm, JL_C(13.82), JL_GATE_MOST), 0);
 }
 
 /* --- nonlinear modes ------------------------------------------------------ */
@@ -191,13 +212,29 @@ static inline void par_meas(jl_meas *meas, jl_real *z, int k)
     meas->z = k % 7 == 5 ? NULL : z;
 }
 
+/* What a gate is for: outliers in a row that it rejects, a number that cannot
+ * be used, a displacement that it gives in to; and at last numbers so large
+ * that, once it has given in, predictions fail. */
+static inline void par_spoil(jl_real *z, int k)
+{
+    if (k >= 14 && k < 17)
+        z[0] += 3000;
+    if (k == 18)
+        z[1] = -JL_REAL_MAX;
+    if (k >= 30 && k < 40)
+        z[0] += 8000;
+    if (k >= 50)
+        z[0] = z[1] = JL_LARGE;
+}
+
 static inline void par_note(struct par_trace *trace, int k, int status,
-                            const jl_real *x, const jl_real *P,
+                            int verdict, const jl_real *x, const jl_real *P,
                             const jl_real *mu, jl_real loglik, int M)
 {
     trace->status[k] = status;
     if (status != JL_OK)
         return;
+    trace->verdict[k] = verdict;
     memcpy(trace->x[k], x, sizeof trace->x[k]);
     memcpy(trace->P[k], P, sizeof trace->P[k]);
     memcpy(trace->mu[k], mu, (size_t)M * sizeof *mu);
@@ -218,13 +255,17 @@ static inline void par_serial(struct par_trace *trace,
     if (shape->nonlinear)
         par_bank_bend(&bank);
     bank.hangs_at = -1;
+    if (shape->gate)
+        par_bank_gate(&bank, shape->sticky);
     for (k = 0; k < PAR_STEPS; k++) {
         par_meas(&meas, z, k);
+        if (shape->gate)
+            par_spoil(z, k);
         status = par_prepare(&bank, &bank.imm, &meas);
         if (status == JL_OK)
             status = jl_imm_step(&bank.imm, meas.z, bank.scratch);
-        par_note(trace, k, status, bank.imm.xhat, bank.imm.Phat, bank.imm.mu,
-                 bank.imm.loglik, shape->M);
+        par_note(trace, k, status, bank.imm.verdict, bank.imm.xhat,
+                 bank.imm.Phat, bank.imm.mu, bank.imm.loglik, shape->M);
     }
 }
 
@@ -242,6 +283,8 @@ static inline int par_pe(int pe, const struct par_shape *shape, jl_chan **to,
     jl_par par;
 
     par_bank_init(bank, shape->M, shape->sticky, shape->form);
+    if (shape->gate)
+        par_bank_gate(bank, shape->sticky);
     if (shape->nonlinear)
         par_bank_bend(bank);
     bank->silent = from[pe];
@@ -293,6 +336,8 @@ static inline int par_host(struct par_trace *trace,
                            60000000);
     for (k = 0; k < PAR_STEPS && status == JL_OK; k++) {
         par_meas(&meas, z, k);
+        if (shape->gate)
+            par_spoil(z, k);
         status = jl_host_send(to, &meas, PAR_Z, buf, sizeof buf, 5000000);
         if (status == JL_OK)
             status = jl_host_recv(from, &estimate, shape->M, PAR_N, buf,
@@ -300,8 +345,8 @@ static inline int par_host(struct par_trace *trace,
         if (status == JL_OK && estimate.seq != meas.seq)
             status = JL_EMSG;
         if (status == JL_OK)
-            par_note(trace, k, estimate.status, x, P, mu, estimate.loglik,
-                     shape->M);
+            par_note(trace, k, estimate.status, estimate.verdict, x, P, mu,
+                     estimate.loglik, shape->M);
     }
     if (blamed != NULL)
         *blamed = estimate.failed_pe;

@@ -75,12 +75,12 @@ static void compare(struct run *run, int slots)
 static void compare_all(struct run *run)
 {
     struct par_shape *s = &run->shape;
-    int slots, forms;
+    int slots, f;
 
     for (s->sticky = 0; s->sticky < 2; s->sticky++)
         for (slots = 0; slots <= 2; slots++)
-            for (forms = 0; forms < 2; forms++) {
-                s->form = forms == 0 ? &jl_kf_joseph : &jl_kf_standard;
+            for (f = 0; f < PAR_FORMS; f++) {
+                s->form = par_forms[f];
                 compare(run, slots);
             }
 }
@@ -152,6 +152,78 @@ static void test_par_leaves_spare_pes_idle(void **state)
                 compare(&run, slots);
 }
 
+/* --- the gate ------------------------------------------------------------- */
+
+/* The reference shows what is to be compared: rejections, some after some that
+ * are missing, and measurements accepted after too many of them. */
+static void check_gated(const struct par_shape *shape)
+{
+    static struct par_trace serial;
+    int k, run = 0, rejected = 0, forced = 0;
+
+    par_serial(&serial, shape);
+    for (k = 0; k < PAR_STEPS && serial.status[k] == JL_OK; k++)
+        if (serial.verdict[k] == JL_REJECTED) {
+            run++;
+            rejected++;
+        } else if (serial.verdict[k] == JL_ACCEPTED) {
+            forced += run == JL_GATE_MOST;
+            run = 0;
+        }
+    assert_int_equal(serial.verdict[18], JL_REJECTED);  /* JL_REAL_MAX */
+    assert_true(rejected >= 14);
+    assert_int_equal(forced, 2);
+    assert_int_equal(serial.verdict[33], JL_MISSING);
+}
+
+static void test_par_gate_gives_serial_bits(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .gate = 1 } };
+    struct par_shape *s = &run.shape;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 1; s->npe <= 8; s->npe++) {
+            compare_all(&run);
+            check_gated(s);
+        }
+}
+
+static void test_par_gate_with_few_modes(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .gate = 1 } };
+    struct par_shape *s = &run.shape;
+
+    (void)state;
+    for (s->M = 1; s->M <= 5; s->M++)
+        for (s->npe = 1; s->npe <= 5; s->npe += 2)
+            compare_all(&run);
+}
+
+/* A PE alone has nothing to reduce. */
+static void test_par_gate_is_not_for_an_all_reduce(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .gate = 1 } };
+    struct par_shape *s = &run.shape;
+    int k;
+
+    (void)state;
+    s->form = &jl_kf_joseph;
+    s->M = PAR_M;
+    s->sticky = 1;
+    s->exchange = JL_EXCHANGE_REDUCE;
+    for (s->npe = 2; s->npe <= 5; s->npe++) {
+        parallel(&run, 1);
+        for (k = 0; k < PAR_STEPS; k++)
+            assert_int_equal(run.trace.status[k], JL_EGATE);
+    }
+    s->npe = 1;
+    compare(&run, 1);
+    assert_int_equal(run.trace.verdict[14], JL_REJECTED);
+}
+
 /* --- the all-reduce ------------------------------------------------------ */
 
 /* The metric of a reference case: x in sigmas, P by sigmas, mu absolute, the
@@ -186,15 +258,14 @@ static void assert_close_trace(const struct par_trace *a,
     }
 }
 
-static void test_par_reduce_equals_serial_up_to_rounding(void **state)
+static void check_reduce(const jl_kf_form *form)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
     static struct par_trace serial, full;
     struct par_shape *s = &run.shape;
     int slots;
 
-    (void)state;
-    s->form = &jl_kf_joseph;
+    s->form = form;
     s->sticky = 1;
     s->exchange = JL_EXCHANGE_REDUCE;
     for (s->M = 1; s->M <= PAR_M; s->M += 2)
@@ -210,6 +281,13 @@ static void test_par_reduce_equals_serial_up_to_rounding(void **state)
                     assert_same_bits(&run.trace, &full, sizeof full);
                 }
         }
+}
+
+static void test_par_reduce_equals_serial_up_to_rounding(void **state)
+{
+    (void)state;
+    check_reduce(&jl_kf_joseph);
+    check_reduce(&jl_kf_sqrt);
 }
 
 static void test_par_reduce_refuses_a_chain_that_is_not_sticky(void **state)
@@ -515,6 +593,9 @@ int main(void)
         cmocka_unit_test(test_par_gives_serial_bits_with_functions),
         cmocka_unit_test(test_par_gives_serial_bits_on_sixteen_pes),
         cmocka_unit_test(test_par_leaves_spare_pes_idle),
+        cmocka_unit_test(test_par_gate_gives_serial_bits),
+        cmocka_unit_test(test_par_gate_with_few_modes),
+        cmocka_unit_test(test_par_gate_is_not_for_an_all_reduce),
         cmocka_unit_test(test_par_reduce_equals_serial_up_to_rounding),
         cmocka_unit_test(test_par_reduce_refuses_a_chain_that_is_not_sticky),
         cmocka_unit_test(test_par_blames_the_dead_and_not_the_relay),

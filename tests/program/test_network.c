@@ -166,7 +166,7 @@ static void free_three(struct program *p)
     check_nobody_left();
 }
 
-#define DIFFERENT "different models, filters, forms or topologies"
+#define DIFFERENT "different models, filters, forms, gates or topologies"
 
 /* A host and two PEs of which the second has other arguments: all refuse. */
 static void check_mismatch_told(const char *const *told)
