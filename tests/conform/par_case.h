@@ -114,8 +114,8 @@ static inline void par_bank_gate(struct par_bank *bank, int sticky)
 
 /* --- nonlinear modes ------------------------------------------------------ */
 
-/* The faster, the more the velocity turns; context is the mode's motion.  Where
- * the measurements that are absurd have led there is no sine, but a code. */
+/* The faster, the more the velocity turns; context is the mode's motion.
+ * Where the measurements that are absurd have led is no sine, but a code. */
 static inline int par_f(jl_real *y, const jl_real *x, void *context)
 {
     const jl_motion *motion = context;
@@ -170,7 +170,7 @@ static inline void par_bank_bend(struct par_bank *bank)
     }
 }
 
-/* --- running it ------------------------------------------------------------ */
+/* --- running it ----------------------------------------------------------- */
 
 /* A model that changes now and then, in a prepare that spoils the scratch. */
 static inline int par_prepare(void *context, jl_imm *imm, const jl_meas *meas)
