@@ -120,8 +120,8 @@ int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
  * modes[j].n of them, map[j][0] < map[j][1] < .. < n in this order (NULL: all).
  * What it lacks is, after each of its predictions, independent of the rest:
  *     x_j[i] = prior_x[i],  P_j[i][i] = prior_var[i] > 0
- * as if it were padded to n with zeros in F and H, and these as mean and variance
- * of its noise; but predict and update cost what its own size does.
+ * as if it were padded to n by zeros in F and H and a noise of this mean and
+ * variance; but predict and update cost what its own size does.
  *
  * The prior says what the component is like when a mode that has it takes over:
  * an acceleration within +-a at the start of a manoeuvre has mean 0, variance
