@@ -130,9 +130,9 @@ int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
  * the component that it is known, and they are slow to see it change; with a
  * huge one they forget what they knew.  xhat and Phat count the prior, too.
  * (Granstrom, Willett, Bar-Shalom 2015, IEEE Trans. AES 51, 2975, on what else
- * is done.  Yuan, Bar-Shalom, Willett, Mozeson, Pollak, Hardiman 2012, 48, 3250,
- * fill in the receiving mode's own estimate: slow again when that was certain,
- * and another for each mode, so that there is no sticky mixing.)
+ * is done.  Yuan, Bar-Shalom, Willett et al. 2012, IEEE Trans. AES 48, 3250, fill
+ * in the receiving mode's own estimate: slow again when that was certain, and
+ * another for each mode, so that there is no sticky mixing.)
  *
  *     static const int cv[] = { 0, 1, 3, 4 };     (of x vx ax y vy ay)
  *     static const int *const map[] = { cv, NULL };
