@@ -117,31 +117,29 @@ int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
                 const jl_kf_form *form, int mixing, jl_real *mem, int cap);
 
 /* The same with modes of different states, n components in all: mode j has
- * modes[j].n of them, map[j][0] < map[j][1] < .. < n in this order (map[j] is
- * not read if that is all n).  What it lacks has, after each of its
- * predictions, a stated mean and variance, independent of the rest:
- *     x_j[i] = prior_x[i],  P_j[i][i] = prior_var[i]
- * as if it were padded to n with zeros in F and H, prior_x as mean and prior_var
- * as variance of its noise; but predict and update cost what its own size does.
+ * modes[j].n of them, map[j][0] < map[j][1] < .. < n in this order (NULL: all).
+ * What it lacks is, after each of its predictions, independent of the rest:
+ *     x_j[i] = prior_x[i],  P_j[i][i] = prior_var[i] > 0
+ * as if it were padded to n by zeros in F and H and a noise of this mean and
+ * variance; but predict and update cost what its own size does.
  *
- * The prior is what the component is like when a mode that has it takes over,
- * say the acceleration at the start of a manoeuvre: for one within +-a, mean 0
- * and variance a^2/3.  Three times too large or small does little harm.  A
- * variance of almost nothing is how padding goes wrong: every mixing then tells
- * the modes that have the component that it is known, and they are slow to see
- * it change; with a huge one they forget what they knew.  xhat and Phat count
- * the prior of modes that lack the component, in proportion to mu.
- * (Granstrom, Willett, Bar-Shalom 2015, IEEE Trans. AES 51, 2975, on mixing
- * states of unequal dimension.  Yuan, Bar-Shalom, Willett, Mozeson, Pollak,
- * Hardiman 2012, 48, 3250, fill in the receiving mode's own estimate, which
- * differs for each mode, so that no sticky mixing is possible.)
+ * The prior says what the component is like when a mode that has it takes over:
+ * an acceleration within +-a at the start of a manoeuvre has mean 0, variance
+ * a^2/3.  A deviation three times too large or small costs little.  With nearly
+ * none, which is how padding goes wrong, every mixing tells the modes that have
+ * the component that it is known, and they are slow to see it change; with a
+ * huge one they forget what they knew.  xhat and Phat count the prior, too.
+ * (Granstrom, Willett, Bar-Shalom 2015, IEEE Trans. AES 51, 2975, on what else
+ * is done.  Yuan, Bar-Shalom, Willett et al. 2012, IEEE Trans. AES 48, 3250, fill
+ * in the receiving mode's own estimate: slow again when that was certain, and
+ * another for each mode, so that there is no sticky mixing.)
  *
  *     static const int cv[] = { 0, 1, 3, 4 };     (of x vx ax y vy ay)
  *     static const int *const map[] = { cv, NULL };
  *     static const jl_real mean[6], var[6] = { 0, 0, 30, 0, 0, 30 };
  *
  * prior_x, prior_var [n] are read only where a mode lacks the component; they
- * and the maps outlive the filter.
+ * and the maps outlive the filter and do not change.
  * Returns as jl_imm_init, JL_EDIM also for a map that is not as said, a
  * component that no mode has, or a form for fixed sizes where one is lacking;
  * JL_ENONFINITE, JL_ERANGE (a variance that is not above 0) for a prior. */

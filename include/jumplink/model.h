@@ -136,7 +136,8 @@ enum {
  * axis; positions are measured with standard deviation sigma_z.  With T the
  * time step, per axis:
  *     CV  F = [1 T; 0 1], G = [T^2/2; T]; with order 3 the acceleration has a
- *         zero row in both
+ *         zero row in both (beside a CA, order 2 and jl_imm_init_sizes see
+ *         manoeuvres sooner)
  *     CA  F = [1 T T^2/2; 0 1 T; 0 0 1], G = [T^2/2; T; 1]       (order 3)
  *     CT  the velocity turns by turn_rate T and the position follows; G as CV
  *         (axes 2; order 2, or 3 with zero acceleration)

@@ -5,13 +5,13 @@
 
 /* --- what init is given -------------------------------------------------- */
 
-/* The map of a mode that lacks components has those that it has, in order. */
+/* A map has the components of its mode in order; NULL: all of them. */
 static int map_fits(const int *map, int k, int n)
 {
     int i;
 
     if (map == NULL)
-        return 0;
+        return k == n;
     for (i = 0; i < k; i++)
         if (map[i] <= (i > 0 ? map[i - 1] : -1) || map[i] >= n)
             return 0;
@@ -45,9 +45,9 @@ int jli_check_sizes(int M, int n, const jl_mode *modes,
     if (form->n != 0 && (form->n != n || form->m != modes[0].m))
         return JL_EDIM;
     for (j = 0; j < M; j++)
-        if (modes[j].m != modes[0].m || modes[j].n > n
-            || (modes[j].n < n && (form->n != 0 || map == NULL
-                                   || !map_fits(map[j], modes[j].n, n))))
+        if (modes[j].m != modes[0].m
+            || (modes[j].n < n && form->n != 0)
+            || !map_fits(map != NULL ? map[j] : NULL, modes[j].n, n))
             return JL_EDIM;
     for (i = 0; i < n && status == JL_OK; i++) {
         int count = 0;

@@ -25,6 +25,7 @@ struct par_shape {
                                    nobody does                              */
     int gate;                   /* a gate, and bursts of outliers           */
     int nonlinear;              /* two of three modes are                   */
+    int sizes;                  /* some modes lack components               */
 };
 
 static const jl_kf_form *const par_forms[] = { &jl_kf_joseph, &jl_kf_standard,
@@ -42,6 +43,7 @@ struct par_bank {
     jl_real Pi[PAR_MOST * PAR_MOST];
     jl_motion motions[PAR_MOST];
     jl_nonlinear nonlinear[PAR_MOST];
+    const int *map[PAR_MOST];
     jl_imm imm;
     jl_chan *silent;            /* nothing ever comes here                  */
     int hangs_at;               /* or -1                                    */
@@ -95,6 +97,47 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
     assert_int_equal(jl_imm_chain(&bank->imm, bank->Pi), 0);
     assert_int_equal(bank->imm.sticky, sticky || M <= 2);
     assert_int_equal(jl_imm_set(&bank->imm, x, P, mu, bank->scratch), 0);
+}
+
+/* A mode of a target that hardly moves: it has no velocities. */
+static inline void par_still(jl_mode *mode, jl_real *mem)
+{
+    static const jl_real F[] = { 1, 0, 0, 1 }, Q[] = { 400, 0, 0, 400 };
+    jl_real scratch[JL_MODE_SCRATCH(PAR_Z, PAR_Z, PAR_Z)];
+
+    assert_int_equal(jl_mode_init(mode, PAR_Z, PAR_Z, PAR_Z, mem,
+                                  JL_MODE_MEM(PAR_Z, PAR_Z, PAR_Z)), 0);
+    assert_int_equal(jl_mode_set(mode, F, F, Q, NULL, F, Q, scratch), 0);
+}
+
+/* Every third mode is like that; one that starts to move does so with 100 m/s
+ * or so.  To be called before there is a gate. */
+static inline void par_bank_sizes(struct par_bank *bank)
+{
+    static const int positions[] = { 0, 2 };
+    static const jl_real mean[PAR_N] = { 0, 100, 0, 50 };
+    static const jl_real var[PAR_N] = { 0, 2500, 0, 900 };
+    jl_real x[PAR_MOST * PAR_N], P[PAR_MOST * PAR_N * PAR_N], mu[PAR_MOST];
+    jl_imm *imm = &bank->imm;
+    int j, M = imm->M;
+
+    memcpy(x, imm->x, (size_t)(M * PAR_N) * sizeof *x);
+    memcpy(mu, imm->mu, (size_t)M * sizeof *mu);
+    for (j = 0; j < M; j++) {
+        jl_imm_cov(imm, j, P + j * PAR_N * PAR_N);
+        bank->map[j] = NULL;
+        if (j % 3 != 1)
+            continue;
+        bank->map[j] = positions;
+        par_still(&bank->modes[j], bank->mode_mem[j]);
+    }
+    assert_int_equal(jl_imm_init_sizes(imm, M, PAR_N, bank->modes, bank->map,
+                                       mean, var, imm->form, JL_MIX_AUTO,
+                                       bank->mem,
+                                       JL_IMM_STATE(PAR_MOST, PAR_N, PAR_Z)),
+                     0);
+    assert_int_equal(jl_imm_chain(imm, bank->Pi), 0);
+    assert_int_equal(jl_imm_set(imm, x, P, mu, bank->scratch), 0);
 }
 
 /* A gate; where that is allowed, nobody enters the last mode. */
@@ -184,8 +227,9 @@ static inline int par_prepare(void *context, jl_imm *imm, const jl_meas *meas)
     if (meas->seq % 10 != 0)
         return JL_OK;
     for (j = 0; j < imm->M && status == JL_OK; j++)
-        status = jl_mode_motion(&bank->modes[j], &bank->motions[j],
-                                meas->seq % 20 == 0 ? JL_C(1.25) : 1);
+        if (bank->modes[j].n == PAR_N)
+            status = jl_mode_motion(&bank->modes[j], &bank->motions[j],
+                                    meas->seq % 20 == 0 ? JL_C(1.25) : 1);
     return status == JL_OK ? jl_imm_chain(imm, bank->Pi) : status;
 }
 
@@ -255,6 +299,8 @@ static inline void par_serial(struct par_trace *trace,
     if (shape->nonlinear)
         par_bank_bend(&bank);
     bank.hangs_at = -1;
+    if (shape->sizes)
+        par_bank_sizes(&bank);
     if (shape->gate)
         par_bank_gate(&bank, shape->sticky);
     for (k = 0; k < PAR_STEPS; k++) {
@@ -283,6 +329,8 @@ static inline int par_pe(int pe, const struct par_shape *shape, jl_chan **to,
     jl_par par;
 
     par_bank_init(bank, shape->M, shape->sticky, shape->form);
+    if (shape->sizes)
+        par_bank_sizes(bank);
     if (shape->gate)
         par_bank_gate(bank, shape->sticky);
     if (shape->nonlinear)

@@ -41,7 +41,7 @@ static void start(struct run *run, int slots)
 {
     /* the last node does nothing but never send, for a PE to sleep on */
     run->loop = jl_loop_new(run->shape.npe + 2,
-                            JL_PAR_MSG(PAR_MOST, PAR_N, PAR_Z), slots);
+                            JL_PAR_MSG(run->shape.M, PAR_N, PAR_Z), slots);
     assert_non_null(run->loop);
     assert_int_equal(jl_loop_run(run->loop, body, run), JL_OK);
     jl_loop_free(run->loop);
@@ -66,7 +66,7 @@ static void compare(struct run *run, int slots)
     parallel(run, slots);
     for (i = 0; i < PAR_STEPS; i++)
         failures += serial.status[i] != JL_OK;
-    if (run->shape.M == PAR_M)
+    if (run->shape.M == PAR_M && !run->shape.sizes)
         assert_true(failures > 0);      /* the comparison covers failed steps */
     assert_same_bits(&run->trace, &serial, sizeof serial);
 }
@@ -224,6 +224,29 @@ static void test_par_gate_is_not_for_an_all_reduce(void **state)
     assert_int_equal(run.trace.verdict[14], JL_REJECTED);
 }
 
+/* --- modes of different states -------------------------------------------- */
+
+static void test_par_sizes_give_serial_bits(void **state)
+{
+    static const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard,
+                                               &jl_kf_sqrt };
+    static struct run run = { .shape = { .hangs_at = -1, .sizes = 1 } };
+    struct par_shape *s = &run.shape;
+    int f, slots;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->npe = 1; s->npe <= 8; s->npe++)
+        for (f = 0; f < 3; f++)
+            for (s->sticky = 0; s->sticky < 2; s->sticky++)
+                for (s->gate = 0; s->gate < 2; s->gate++)
+                    for (slots = 0; slots <= 1; slots++) {
+                        s->form = forms[f];
+                        s->topology = s->npe % (JL_TOPO_CHAIN + 1);
+                        compare(&run, slots);
+                    }
+}
+
 /* --- the all-reduce ------------------------------------------------------ */
 
 /* The metric of a reference case: x in sigmas, P by sigmas, mu absolute, the
@@ -258,7 +281,7 @@ static void assert_close_trace(const struct par_trace *a,
     }
 }
 
-static void check_reduce(const jl_kf_form *form)
+static void check_reduce(const jl_kf_form *form, int sizes)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
     static struct par_trace serial, full;
@@ -268,6 +291,7 @@ static void check_reduce(const jl_kf_form *form)
     s->form = form;
     s->sticky = 1;
     s->exchange = JL_EXCHANGE_REDUCE;
+    s->sizes = sizes;
     for (s->M = 1; s->M <= PAR_M; s->M += 2)
         for (s->npe = 1; s->npe <= 8; s->npe++) {
             par_serial(&serial, s);
@@ -286,8 +310,15 @@ static void check_reduce(const jl_kf_form *form)
 static void test_par_reduce_equals_serial_up_to_rounding(void **state)
 {
     (void)state;
-    check_reduce(&jl_kf_joseph);
-    check_reduce(&jl_kf_sqrt);
+    check_reduce(&jl_kf_joseph, 0);
+    check_reduce(&jl_kf_sqrt, 0);
+}
+
+static void test_par_sizes_reduce_equals_serial_up_to_rounding(void **state)
+{
+    (void)state;
+    check_reduce(&jl_kf_joseph, 1);
+    check_reduce(&jl_kf_sqrt, 1);
 }
 
 static void test_par_reduce_refuses_a_chain_that_is_not_sticky(void **state)
@@ -596,7 +627,9 @@ int main(void)
         cmocka_unit_test(test_par_gate_gives_serial_bits),
         cmocka_unit_test(test_par_gate_with_few_modes),
         cmocka_unit_test(test_par_gate_is_not_for_an_all_reduce),
+        cmocka_unit_test(test_par_sizes_give_serial_bits),
         cmocka_unit_test(test_par_reduce_equals_serial_up_to_rounding),
+        cmocka_unit_test(test_par_sizes_reduce_equals_serial_up_to_rounding),
         cmocka_unit_test(test_par_reduce_refuses_a_chain_that_is_not_sticky),
         cmocka_unit_test(test_par_blames_the_dead_and_not_the_relay),
         cmocka_unit_test(test_par_refuses_bad_measurements_with_a_code),

@@ -743,8 +743,9 @@ static void open_tracker(struct tracker *t, int padded)
     }
     if (padded)
         P[8] = 0;
-    assert_int_equal(jl_imm_init_sizes(&t->imm, 2, 3, t->modes, maps, mean,
-                                       var, &jl_kf_joseph, JL_MIX_AUTO, t->mem,
+    assert_int_equal(jl_imm_init_sizes(&t->imm, 2, 3, t->modes,
+                                       padded ? NULL : maps, mean, var,
+                                       &jl_kf_joseph, JL_MIX_AUTO, t->mem,
                                        JL_IMM_STATE(2, 3, 1)), JL_OK);
     assert_int_equal(jl_imm_chain(&t->imm, Pi), JL_OK);
     assert_int_equal(jl_imm_set(&t->imm, x, P, half, scratch), JL_OK);
@@ -828,7 +829,8 @@ static int map_status(int a, int b, int c, int d)
 static void test_sizes_init_refuses_maps(void **state)
 {
     const int cap = JL_IMM_STATE(M, N, Z);
-    const int *none[M] = { NULL };
+    const int *none[M] = { NULL }, *maps[M];
+    int all[N] = { 1, 0, 2, 3, 4, 5 };
     jl_kf_form fixed = jl_kf_joseph;
 
     (void)state;
@@ -849,6 +851,14 @@ static void test_sizes_init_refuses_maps(void **state)
     assert_int_equal(init_status(JL_MAX_STATES + 1, map, &jl_kf_joseph,
                                  INT_MAX), JL_EDIM);
     assert_int_equal(init_status(N, map, &jl_kf_joseph, cap - 1), JL_ENOMEM);
+    memcpy(maps, map, sizeof maps);
+    maps[1] = all;
+    assert_int_equal(init_status(N, maps, &jl_kf_joseph, cap), JL_EDIM);
+    all[0] = 0;
+    all[1] = 1;
+    assert_int_equal(jl_imm_init_sizes(&rig.imm, M, N, rig.modes, maps, prior_x,
+                                       prior_var, &jl_kf_joseph, JL_MIX_AUTO,
+                                       rig.mem + EDGE, cap), JL_OK);
     fixed.n = N;                        /* it cannot do the smaller modes */
     fixed.m = Z;
     assert_int_equal(init_status(N, map, &fixed, cap), JL_EDIM);
@@ -1022,7 +1032,7 @@ static void test_sizes_of_one_mode(void **state)
                                        JL_MIX_AUTO, rig.mem + EDGE,
                                        JL_IMM_STATE(1, N, Z)), JL_EDIM);
     assert_same_bits(&rig, &before, sizeof rig);
-    assert_int_equal(jl_imm_init_sizes(&rig.imm, 1, 4, rig.modes, maps,
+    assert_int_equal(jl_imm_init_sizes(&rig.imm, 1, 4, rig.modes, NULL,
                                        prior_x, prior_var, &jl_kf_joseph,
                                        JL_MIX_AUTO, rig.mem + EDGE,
                                        JL_IMM_STATE(1, 4, Z)), JL_OK);
