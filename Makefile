@@ -138,7 +138,7 @@ check: deps
 # tests/<folder>/test_x.c becomes $(BUILD)/tests/test_x and
 # $(BUILD)/tests_f32/test_x; other .c files help the tests of their folder.
 # A test knows the checkout (TOP_DIR) and its program (JUMPLINK) by macros.
-TEST_FOLDERS := unit golden conform fault program fuzz
+TEST_FOLDERS := unit golden conform fault program fuzz examples
 TESTING = $(HOST) -Isrc -Itests -I$(BUILD)/golden -DTOP_DIR='"$(CURDIR)"' \
     -DJUMPLINK='"$(abspath $(BUILD)/jumplink$(1))"'
 
@@ -146,7 +146,7 @@ HELP_FROM_fault := tests/conform/conform.c
 
 define tests_of # folder, suffix
 HELP_$(1)$(2) := $$(patsubst %.c,$(BUILD)/obj$(2)/%.o,$$(filter-out \
-    tests/$(1)/test_% tests/$(1)/gen_%,$$(wildcard tests/$(1)/*.c) $(HELP_FROM_$(1))))
+    tests/$(1)/test_% tests/$(1)/gen_% tests/examples/%,$$(wildcard tests/$(1)/*.c) $(HELP_FROM_$(1))))
 TESTS_$(1)$(2) := $$(patsubst tests/$(1)/%.c,$(BUILD)/tests$(2)/%,$$(wildcard \
     tests/$(1)/test_*.c))
 TESTS += $$(TESTS_$(1)$(2))
@@ -172,7 +172,7 @@ $(BUILD)/gen_golden: tests/golden/gen_golden.c $(BUILD)/flags
 
 run-tests: $(TESTS) $(PROGRAMS) lib
 	@CC='$(CC)' CFLAGS='$(CFLAGS)' BUILD='$(BUILD)' sh tests/check/run_tests.sh \
-	    $(sort $(TESTS)) tests/check/test_mixing.sh tests/check/test_readme.sh
+	    $(sort $(TESTS)) tests/check/test_mixing.sh tests/check/test_readme.sh tests/check/test_examples.sh
 
 # No fork: what ThreadSanitizer watches are threads.
 run-tsan: $(foreach t,conform_loop conform_threads par_loop par_threads fault_threads,$(BUILD)/tests/test_$(t) $(BUILD)/tests_f32/test_$(t))
@@ -248,7 +248,7 @@ install: all
 	mkdir -p $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include/jumplink $(DESTDIR)$(PREFIX)/bin
 	cp $(BUILD)/libjumplink.a $(BUILD)/libjumplink_f32.a $(DESTDIR)$(PREFIX)/lib/
 	cp include/jumplink.h $(DESTDIR)$(PREFIX)/include/
-	cp include/jumplink/*.h $(DESTDIR)$(PREFIX)/include/jumplink/
+	cp include/jumplink/*.h include/jumplink/*.def $(DESTDIR)$(PREFIX)/include/jumplink/
 	$(if $(PROGRAMS),cp $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin/)
 
 clean:

@@ -8,7 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "chi_square.h"
 #include "jumplink/config.h"
+#include "jumplink/par.h"
 
 int misuse(const char *command, const char *format, ...)
 {
@@ -61,6 +63,22 @@ int option_seconds(long *us, const char *command, const char *option,
     return 0;
 }
 
+static int take_probability(double *p, const char *command,
+                            const char *option, const char *value)
+{
+    char *end;
+
+    *p = strtod(value, &end);
+    return end != value && *end == '\0' && *p > 0 && *p < 1 ? 0
+        : misuse(command, "--%s %s: must be a probability above 0 and below 1",
+                 option, value);
+}
+
+jl_real options_gate(const struct options *o, int m)
+{
+    return o->gate > 0 ? (jl_real)chi_square_quantile(o->gate, m) : 0;
+}
+
 static const char *const ports[] = { "loop", "threads", "lcm", NULL };
 
 const char *options_port_name(enum port port)
@@ -111,11 +129,24 @@ const char *options_topology(const struct options *o)
     return topologies[o->topology];
 }
 
+static const char *const forms[] = { "joseph", "standard", "sqrt", NULL };
+static const jl_kf_form *const form_of[] = {
+    &jl_kf_joseph, &jl_kf_standard, &jl_kf_sqrt
+};
+
+const char *options_form(const struct options *o)
+{
+    int i = 0;
+
+    while (form_of[i] != o->form)
+        i++;
+    return forms[i];
+}
+
 int options_take(struct options *o, int c, char *const *argv)
 {
     const char *value = optarg;
     static const char *const filters[] = { "imm", "kf", NULL };
-    static const char *const forms[] = { "joseph", "standard", NULL };
     static const char *const holds[] = { "none", "detect", "column", NULL };
     static const char *const exchanges[] = { "gather", "reduce", NULL };
     long number = 0;
@@ -133,8 +164,10 @@ int options_take(struct options *o, int c, char *const *argv)
         return status;
     case 1003:
         i = choose(o->command, "form", value, forms);
-        o->form = i == 1 ? &jl_kf_standard : &jl_kf_joseph;
-        return i < 0 ? 2 : 0;
+        if (i < 0)
+            return 2;
+        o->form = form_of[i];
+        return 0;
     case 1004:
         i = choose(o->command, "hold", value, holds);
         o->hold = (enum hold)(i + HOLD_NONE);
@@ -172,6 +205,13 @@ int options_take(struct options *o, int c, char *const *argv)
     case 1014:
         o->exchange = choose(o->command, "exchange", value, exchanges);
         return o->exchange < 0 ? 2 : 0;
+    case 1015:
+        return take_probability(&o->gate, o->command, "gate", value);
+    case 1016:
+        status = option_long(&number, o->command, "gate-most", value, 1,
+                             1000000000);
+        o->gate_most = (int)number;
+        return status;
     case 'o':
         return take_word(&o->out, o->command, "out", value);
     case ':':
@@ -181,6 +221,18 @@ int options_take(struct options *o, int c, char *const *argv)
             return misuse(o->command, "unknown option -%c", optopt);
         return misuse(o->command, "unknown option %s", argv[optind - 1]);
     }
+}
+
+int options_end(struct options *o)
+{
+    if (o->gate_most > 0 && !(o->gate > 0))
+        return misuse(o->command, "--gate-most goes with --gate");
+    if (o->gate > 0 && o->exchange == JL_EXCHANGE_REDUCE)
+        return misuse(o->command, "--gate needs --exchange gather: a PE's pool "
+                      "would depend on whether all others reject, too");
+    if (o->gate_most == 0)
+        o->gate_most = JL_GATE_MOST;
+    return 0;
 }
 
 int options_parse(struct options *o, int argc, char **argv, const char *help)
@@ -197,5 +249,6 @@ int options_parse(struct options *o, int argc, char **argv, const char *help)
         if (status != 0)
             return status;
     }
-    return -1;
+    status = options_end(o);
+    return status == 0 ? -1 : status;
 }

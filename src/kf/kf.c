@@ -1,6 +1,6 @@
 /* The Kalman filter as an object: a form's steps, committed when they went
  * well. */
-#include "jumplink/kf.h"
+#include "kf/kf_gate.h"
 
 #include "mat/mat_k.h"
 
@@ -36,6 +36,7 @@ static void forget(jl_kf *kf)
     kf->accepted = 0;
     kf->rejected = 0;
     kf->run = 0;
+    kf->verdict = JL_MISSING;
 }
 
 int jl_kf_set(jl_kf *kf, const jl_real *x, const jl_real *P,
@@ -59,35 +60,27 @@ void jl_kf_cov(const jl_kf *kf, jl_real *P)
     kf->form->cov->give(P, kf->P, kf->mode->n);
 }
 
-int jl_kf_gate(jl_kf *kf, jl_real nis, int most)
-{
-    if (!(nis >= 0 && nis <= JL_REAL_MAX) || most < 0)
-        return JL_ERANGE;
-    kf->gate = nis;
-    kf->most = most;
-    return JL_OK;
-}
-
 int jl_kf_predict(jl_kf *kf, jl_real *scratch)
 {
     int n = kf->mode->n, size = n + n * n, status;
-    jl_real *before = scratch, *rest = before + size;
+    jl_real *before = scratch;
 
     jli_copy(before, kf->x, size);              /* x and P */
     status = kf->form->predict(kf->x, kf->P, kf->mode, before, before + n,
-                               rest);
+                               before + size);
     if (status != JL_OK)
         jli_copy(kf->x, before, size);
     return status;
 }
 
-/* Whether the gate rejects it. */
-static int rejects(const jl_kf *kf, jl_real nis)
+/* Above this nis a measurement is rejected; 0: never. */
+static jl_real limit(const jl_kf *kf)
 {
-    return kf->gate > 0 && nis > kf->gate && kf->run < kf->most;
+    return kf->gate > 0 && kf->run >= kf->most ? JL_REAL_MAX : kf->gate;
 }
 
-/* Take down what an update gave. */
+/* Counts stay where they are as large as can be: a mean divides by one, and one
+ * that is signed must not overflow. */
 static void count(jl_kf *kf, const jl_innovation *got)
 {
     jl_real *nu = kf->innovation.nu;
@@ -95,43 +88,43 @@ static void count(jl_kf *kf, const jl_innovation *got)
     jli_copy(nu, got->nu, kf->mode->m);
     kf->innovation = *got;
     kf->innovation.nu = nu;
-    if (rejects(kf, got->nis)) {
-        kf->run++;
+    if (kf->verdict == JL_REJECTED) {
+        kf->run += kf->run < INT_MAX;
         kf->rejected++;
     } else {
         kf->run = 0;
-        kf->accepted++;
+        kf->accepted += kf->accepted < ULONG_MAX;
         kf->nis_mean += (got->nis - kf->nis_mean) / (jl_real)kf->accepted;
     }
 }
 
-/* Update from the estimate `prior`, which is also what a measurement that is
- * missing or rejected leaves; what becomes of the filter otherwise is written to
- * it at once, and on failure it is as in `before`.  x and P lie together. */
-static int update(jl_kf *kf, jl_real *loglik, const jl_real *z,
-                  const jl_real *prior, const jl_real *before,
-                  jl_real *scratch)
+/* The prediction xp [n + n n], and z or NULL, become the estimate.  The update
+ * writes it where it is kept, so that the next step need not wait for a copy;
+ * on failure it is again what is in `before`. */
+static int absorb(jl_kf *kf, jl_real *loglik, const jl_real *xp,
+                  const jl_real *before, const jl_real *z, jl_real *scratch)
 {
-    int n = kf->mode->n, size = n + n * n, status;
+    int n = kf->mode->n, size = n + n * n, status, verdict = JL_MISSING;
+    jl_real *nu = scratch, gate = limit(kf);
     jl_innovation got;
 
-    got.nu = scratch;
-    got.loglik = 0;
     if (z != NULL) {
-        status = kf->form->update(kf->x, kf->P, &got, kf->mode, prior,
-                                  prior + n, z, scratch + kf->mode->m);
+        got.nu = nu;
+        status = jli_gated_update(kf->x, kf->P, &got, kf->form, kf->mode, xp,
+                                  xp + n, z, gate, nu + kf->mode->m);
         if (status != JL_OK) {
             jli_copy(kf->x, before, size);
             return status;
         }
+        verdict = gate > 0 && got.nis > gate ? JL_REJECTED : JL_ACCEPTED;
+    }
+    kf->verdict = verdict;
+    if (z != NULL)
         count(kf, &got);
-    }
-    if (z == NULL || kf->run > 0) {
-        jli_copy(kf->x, prior, size);
-        got.loglik = 0;
-    }
+    if (verdict != JL_ACCEPTED)
+        jli_copy(kf->x, xp, size);
     if (loglik != NULL)
-        *loglik = got.loglik;
+        *loglik = verdict == JL_ACCEPTED ? got.loglik : 0;
     return JL_OK;
 }
 
@@ -141,19 +134,18 @@ int jl_kf_update(jl_kf *kf, jl_real *loglik, const jl_real *z,
     int n = kf->mode->n, size = n + n * n;
 
     jli_copy(scratch, kf->x, size);
-    return update(kf, loglik, z, scratch, scratch, scratch + size);
+    return absorb(kf, loglik, scratch, scratch, z, scratch + size);
 }
 
 int jl_kf_step(jl_kf *kf, jl_real *loglik, const jl_real *z,
                jl_real *scratch)
 {
     int n = kf->mode->n, size = n + n * n, status;
-    jl_real *before = scratch, *prior = before + size, *rest = prior + size;
+    jl_real *before = scratch, *xp = before + size, *rest = xp + size;
 
-    status = kf->form->predict(prior, prior + n, kf->mode, kf->x, kf->P,
-                               rest);
+    status = kf->form->predict(xp, xp + n, kf->mode, kf->x, kf->P, rest);
     if (status != JL_OK)
         return status;
     jli_copy(before, kf->x, size);
-    return update(kf, loglik, z, prior, before, rest);
+    return absorb(kf, loglik, xp, before, z, rest);
 }

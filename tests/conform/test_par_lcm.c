@@ -84,25 +84,39 @@ static void compare(const struct par_shape *shape)
     assert_same_bits(&trace, &serial, sizeof serial);
 }
 
-static void test_par_gives_serial_bits_over_lcm_and_topologies(void **state)
+static void compare_all(int gate)
 {
-    struct par_shape s = { 0, PAR_M, 0, &jl_kf_joseph, 0, 0, 0, -1 };
+    struct par_shape s = { .M = PAR_M, .form = &jl_kf_joseph,
+                           .hangs_at = -1, .gate = gate };
 
-    (void)state;
     if (!is_private)
         skip();
     for (s.topology = JL_TOPO_FULL; s.topology <= JL_TOPO_CHAIN;
          s.topology++)
         for (s.npe = 1; s.npe <= 8; s.npe++) {
             s.sticky = s.npe % 2;
+            s.form = par_forms[s.npe / 2 % PAR_FORMS];
             compare(&s);
         }
+}
+
+static void test_par_gives_serial_bits_over_lcm_and_topologies(void **state)
+{
+    (void)state;
+    compare_all(0);
+}
+
+static void test_par_gate_gives_serial_bits_over_lcm(void **state)
+{
+    (void)state;
+    compare_all(1);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_over_lcm_and_topologies),
+        cmocka_unit_test(test_par_gate_gives_serial_bits_over_lcm),
     };
 
     is_private = private_net_enter() == 0;

@@ -89,8 +89,8 @@ static void set_matrices(jl_mode *mode, jl_real *mem, const jl_motion *motion,
 static void set_motion(jl_mode *mode, jl_real *mem, const jl_motion *motion,
                        jl_real dt)
 {
-    assert_int_equal(jl_mode_init(mode, DIM, AXES, jl_motion_noises(motion), mem,
-                                  JL_MODE_MEM(DIM, AXES, DIM)), JL_OK);
+    assert_int_equal(jl_mode_init(mode, DIM, AXES, jl_motion_noises(motion),
+                                  mem, JL_MODE_MEM(DIM, AXES, DIM)), JL_OK);
     assert_int_equal(jl_mode_motion(mode, motion, dt), JL_OK);
 }
 
@@ -184,6 +184,7 @@ static void test_imm_of_motions_is_of_their_matrices(void **state)
     (void)state;
     run(&jl_kf_joseph);
     run(&jl_kf_standard);
+    run(&jl_kf_sqrt);
 }
 
 int main(void)
