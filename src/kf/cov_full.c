@@ -16,8 +16,7 @@ static void pool(jl_real *mean, jl_real *S, const jl_real *w,
                  const jl_real *x, const jl_real *Ss, jl_real *scratch,
                  int M, int n)
 {
-    (void)scratch;
-    jli_full_pool(mean, S, w, x, Ss, M, n);
+    jli_full_pool(mean, S, w, x, Ss, scratch, M, n);
 }
 
 static void blend(jl_real *x, jl_real *S, jl_real a, const jl_real *x1,

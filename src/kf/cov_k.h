@@ -44,14 +44,19 @@ JL_INLINE void jli_between(jl_real *x, jl_real *d, jl_real a,
 #define JLI_POOL_COLUMNS(type, width) \
     for (; j + width <= n; j += width) \
         *(type *)(P + r * n + j) += w[i] \
-            * (*(const type *)(Pi + r * n + j) + (xi[r] - mean[r]) \
+            * (*(const type *)(Pi + r * n + j) + d[r] \
                * (*(const type *)(xi + j) - *(const type *)(mean + j)));
+
+#define JLI_DIFF(type, width) \
+    for (; j + width <= n; j += width) \
+        *(type *)(d + j) = *(const type *)(xi + j) - *(const type *)(mean + j);
 
 JL_INLINE void jli_full_pool(jl_real *JL_RESTRICT mean,
                              jl_real *JL_RESTRICT P,
                              const jl_real *JL_RESTRICT w,
                              const jl_real *JL_RESTRICT x,
-                             const jl_real *JL_RESTRICT Ps, int M, int n)
+                             const jl_real *JL_RESTRICT Ps,
+                             jl_real *JL_RESTRICT d, int M, int n)
 {
     int i, r, j;
 
@@ -60,6 +65,10 @@ JL_INLINE void jli_full_pool(jl_real *JL_RESTRICT mean,
     for (i = 0; i < M; i++) {
         const jl_real *xi = x + i * n, *Pi = Ps + i * n * n;
 
+        j = 0;
+        JLI_DIFF(jli_wide, JLI_WIDE)
+        JLI_DIFF(jli_pack, JLI_PACK)
+        JLI_DIFF(jl_real, 1)
         for (r = 0; r < n; r++) {
             j = r - r % JLI_PACK;               /* from the diagonal on */
             JLI_POOL_COLUMNS(jli_wide, JLI_WIDE)

@@ -31,8 +31,7 @@
         jl_real *scratch, int count, int n) \
     { \
         (void)n; \
-        (void)scratch; \
-        jli_full_pool(mean, S, w, x, Ss, count, N); \
+        jli_full_pool(mean, S, w, x, Ss, scratch, count, N); \
     } \
     static void PASTE(blend, N, M)(jl_real *x, jl_real *S, jl_real a, \
         const jl_real *x1, const jl_real *S1, jl_real b, const jl_real *x2, \
