@@ -219,9 +219,9 @@ $(BENCHES): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o \
 # Steps of fixed sizes beside Eigen: everybody's filters compiled for this
 # machine, the others' also with fused multiply-adds, which the library does
 # without for the sake of its bits.
-NATIVE := -O3 -march=native
 $(BUILD)/native/libjumplink.a: $(CORE_SRC:%.c=$(BUILD)/native/%.o)
-$(BUILD)/native/%: private CFLAGS += $(NATIVE)
+$(BUILD)/native/src/%: private CFLAGS += -march=native
+$(BUILD)/native/tests/%: private CFLAGS += -O3 -march=native
 $(BUILD)/native/src/%.o: src/%.c $(BUILD)/flags
 	$(call compile,$(CORE))
 $(BUILD)/native/%.o: %.c $(BUILD)/flags

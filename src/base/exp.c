@@ -6,7 +6,7 @@
  *   Taylor's remainder, r^8/8! (float r^5/5!)               0.006 (float 0.001)
  *   r, and e^r - 1 = r + r^2 (1/2 + ...), rounded           0.03
  *   2^(j/16) (e^r - 1) and its sum with the low part        0.04
- * Measured: 0.567 (every float: 0.559).  A denormal result is rounded twice,
+ * Measured: 0.565 (every float: 0.558).  A denormal result is rounded twice,
  * but the first time to a finer number; measured: 0.76.
  */
 #include "jumplink/base.h"
@@ -40,7 +40,9 @@ static const jl_real power[STEPS][2] = {
 
 #define LOWEST JL_C(-104.0)             /* below it e^x < 2^-150 becomes 0 */
 #define HIGHEST JL_C(89.0)              /* above it e^x > 2^128 */
-#define BIAS (STEPS * 151)              /* makes step numbers positive */
+#define BIAS 151                        /* makes k positive */
+#define LEAST_K (FLT_MIN_EXP - 1)       /* 2^k is normal */
+#define MOST_K (FLT_MAX_EXP - 1)
 
 /* ln2/16: 12 bits, so that a step number of 12 bits times it is exact; rest. */
 #define STEP_HIGH JL_C(0.0433197021484375)
@@ -56,7 +58,9 @@ JL_INLINE jl_real tail(jl_real r)
 
 #define LOWEST JL_C(-746.0)             /* 2^-1075 */
 #define HIGHEST JL_C(710.0)             /* 2^1024 */
-#define BIAS (STEPS * 1077L)
+#define BIAS 1077
+#define LEAST_K (DBL_MIN_EXP - 1)
+#define MOST_K (DBL_MAX_EXP - 1)
 
 /* ln2/16: 37 bits, for step numbers of 15 bits, and the rest. */
 #define STEP_HIGH JL_C(0.0433216987848936696536839008331298828125)
@@ -66,28 +70,29 @@ JL_INLINE jl_real tail(jl_real r)
 {
     const jl_real rr = r * r;
 
-    return (JL_C(1.0) / 2 + r * (JL_C(1.0) / 6))
-        + rr * ((JL_C(1.0) / 24 + r * (JL_C(1.0) / 120))
-        + rr * (JL_C(1.0) / 720 + r * (JL_C(1.0) / 5040)));
+    return ((JL_C(1.0) / 2 + r * (JL_C(1.0) / 6))
+        + rr * (JL_C(1.0) / 24 + r * (JL_C(1.0) / 120)))
+        + rr * rr * (JL_C(1.0) / 720 + r * (JL_C(1.0) / 5040));
 }
 
 #endif
 
 jl_real jl_exp(jl_real x)
 {
+    const jl_real bias = JLI_WHOLE + STEPS * BIAS;
     jl_real n, r, y;
-    long step;
-    int j, k;
+    int step, j, k;
 
     if (x < LOWEST)
         return 0;
     if (!(x <= HIGHEST))
         return x * JL_REAL_MAX;         /* infinity, or NaN */
 
-    step = (long)(x * STEPS_PER_UNIT + (BIAS + JL_C(0.5)));
-    n = (jl_real)(step - BIAS);
-    j = (int)(step & (STEPS - 1));
-    k = (int)(step / STEPS - BIAS / STEPS);
+    n = x * STEPS_PER_UNIT + bias;
+    step = jli_integer(n);
+    n -= bias;
+    j = step & (STEPS - 1);
+    k = step / STEPS - BIAS;
 
     r = (x - n * STEP_HIGH) - n * STEP_LOW;
     r = r + r * r * tail(r);
@@ -95,5 +100,7 @@ jl_real jl_exp(jl_real x)
 
     /* 2^k itself may be too large or too small; of its two halves the first
      * changes no digit of y, so that a denormal result is rounded once here. */
+    if (k >= LEAST_K && k <= MOST_K)
+        return y * jli_pow2(k);
     return y * jli_pow2(k / 2) * jli_pow2(k - k / 2);
 }

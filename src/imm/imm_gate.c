@@ -48,6 +48,10 @@ int jl_imm_judge(jl_imm *imm, const jl_real *z, jl_real *scratch)
     if (imm->stage != JLI_FILTERED)
         return JL_EORDER;
     imm->stage = JLI_JUDGED;
+    if (z != NULL && !(imm->gate > 0)) {
+        imm->verdict = JL_ACCEPTED;
+        return JL_OK;
+    }
     imm->verdict = z == NULL ? JL_MISSING
         : all_reject(imm) ? JL_REJECTED : JL_ACCEPTED;
     for (j = 0; j < imm->M && status == JL_OK; j++) {

@@ -25,26 +25,23 @@ static jl_real log_foresee(jl_imm *imm, int j)
 
 void jl_imm_foresee(jl_imm *imm)
 {
-    int i, j, M = imm->M;
+    int j, M = imm->M;
 
-    if (imm->sticky && !imm->combined)
-        jl_imm_combine(imm);
-    for (j = 0; j < M; j++) {
-        jl_real c = 0;
-
-        if (imm->sticky)
-            c = imm->lambda[j] * imm->mu[j] + imm->v[j];
-        else
-            for (i = 0; i < M; i++)
-                c += imm->Pi[i * M + j] * imm->mu[i];
-        if (c > JLI_SMALL) {
-            imm->c[j] = c;
-            imm->logc[j] = jl_log(c);
+    if (imm->sticky) {
+        if (!imm->combined)
+            jl_imm_combine(imm);
+        for (j = 0; j < M; j++)
+            imm->c[j] = imm->lambda[j] * imm->mu[j] + imm->v[j];
+    } else {
+        jli_row(imm->c, NULL, JLI_PRODUCT, imm->mu, 1, imm->Pi, M, M);
+    }
+    for (j = 0; j < M; j++)
+        if (imm->c[j] > JLI_SMALL) {
+            imm->logc[j] = jl_log(imm->c[j]);
         } else {
             imm->logc[j] = log_foresee(imm, j);
             imm->c[j] = jl_exp(imm->logc[j]);
         }
-    }
     imm->stage = JLI_MIXED;
 }
 
@@ -60,19 +57,28 @@ static void normalise(jl_real *w, int n)
         w[i] /= sum;
 }
 
+/* part / all, from r = 1 / all; exactly 1 for all of it, so that modes that are
+ * entered from nowhere else keep their bits. */
+static jl_real share(jl_real part, jl_real all, jl_real r)
+{
+    return part < all ? part * r : 1;
+}
+
 /* w_i = mu_ij = Pi[i][j] mu_i / c_j */
 static void shares(jl_real *w, const jl_imm *imm, int j)
 {
+    const jl_real *Pi = imm->Pi + j;
     int i, M = imm->M;
 
     if (imm->c[j] > JLI_SMALL) {
+        const jl_real r = 1 / imm->c[j];
+
         for (i = 0; i < M; i++)
-            w[i] = imm->Pi[i * M + j] * imm->mu[i] / imm->c[j];
+            w[i] = share(Pi[i * M] * imm->mu[i], imm->c[j], r);
         return;
     }
     for (i = 0; i < M; i++)
-        w[i] = jl_exp(jl_log(imm->Pi[i * M + j]) + imm->logmu[i]
-                      - imm->logc[j]);
+        w[i] = jl_exp(jl_log(Pi[i * M]) + imm->logmu[i] - imm->logc[j]);
     normalise(w, M);
 }
 
@@ -80,8 +86,10 @@ static void shares(jl_real *w, const jl_imm *imm, int j)
 static void sticky_shares(jl_real *w, const jl_imm *imm, int j)
 {
     if (imm->c[j] > JLI_SMALL) {
-        w[0] = imm->lambda[j] * imm->mu[j] / imm->c[j];
-        w[1] = imm->v[j] / imm->c[j];
+        const jl_real r = 1 / imm->c[j];
+
+        w[0] = share(imm->lambda[j] * imm->mu[j], imm->c[j], r);
+        w[1] = share(imm->v[j], imm->c[j], r);
         return;
     }
     w[0] = jl_exp(jl_log(imm->lambda[j]) + imm->logmu[j] - imm->logc[j]);

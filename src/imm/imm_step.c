@@ -107,8 +107,10 @@ static int filter_mode(jl_imm *imm, int j, const jl_real *z, jl_real *scratch)
     got.nu = imm->nu + j * imm->m;
     status = imm->form->predict(xp, Pp, mode, x, P, rest);
     if (status == JL_OK)
-        status = jli_gated_update(x, P, &got, imm->form, mode, xp, Pp, z,
-                                  imm->gate, rest);
+        status = imm->gate > 0
+            ? jli_gated_update(x, P, &got, imm->form, mode, xp, Pp, z,
+                               imm->gate, rest)
+            : imm->form->update(x, P, &got, mode, xp, Pp, z, rest);
     if (status != JL_OK) {
         imm->stage = JLI_FAILED;
         return status;
@@ -166,6 +168,7 @@ static jl_real best_likelihood(const jl_imm *imm)
 /* As in kf.c, counts stay where they are as large as can be. */
 static void count(jl_imm *imm)
 {
+    jl_real part;
     int j;
 
     if (imm->verdict == JL_REJECTED) {
@@ -174,16 +177,16 @@ static void count(jl_imm *imm)
     } else if (imm->verdict == JL_ACCEPTED) {
         imm->run = 0;
         imm->accepted += imm->accepted < ULONG_MAX;
+        part = 1 / (jl_real)imm->accepted;
         for (j = 0; j < imm->M; j++)
-            imm->nis_mean[j] += (imm->nis[j] - imm->nis_mean[j])
-                / (jl_real)imm->accepted;
+            imm->nis_mean[j] += (imm->nis[j] - imm->nis_mean[j]) * part;
     }
 }
 
 int jl_imm_weigh(jl_imm *imm)
 {
     int j, M = imm->M;
-    jl_real *e = imm->e, best, sum, lse;
+    jl_real *e = imm->e, best, sum, lse, r;
 
     if (imm->stage != JLI_JUDGED)
         return JL_EORDER;
@@ -193,9 +196,10 @@ int jl_imm_weigh(jl_imm *imm)
         e[j] = imm->logmu[j];
     }
     lse = jli_log_sum_exp(e, M, &sum);
+    r = 1 / sum;
     for (j = 0; j < M; j++) {
         imm->logmu[j] -= lse;
-        imm->mu[j] = e[j] / sum;
+        imm->mu[j] = e[j] * r;
     }
     imm->loglik = imm->verdict == JL_ACCEPTED ? best + lse : 0;
     count(imm);

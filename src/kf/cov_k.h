@@ -24,31 +24,39 @@ void jli_full_whole(jl_real *Sn, const jl_real *S, const int *map,
 JL_INLINE void jli_mean(jl_real *mean, const jl_real *w, const jl_real *x,
                         int M, int n)
 {
-    jli_row(mean, NULL, JLI_ROW, w, 1, x, M, n);
+    jli_row(mean, NULL, JLI_PRODUCT, w, 1, x, M, n);
 }
 
 /* d = x1 - x2, and a x1 + b x2, for a + b = 1, from where more weight is: near
  * x2 an x1 far away does no harm. */
+#define JLI_BETWEEN(type, width, end) \
+    for (; i < end; i += width) { \
+        const type v = *(const type *)(x1 + i) - *(const type *)(x2 + i); \
+        *(type *)(d + i) = v; \
+        *(type *)(x + i) = *(const type *)(from + i) + part * v; \
+    }
+
 JL_INLINE void jli_between(jl_real *x, jl_real *d, jl_real a,
                            const jl_real *x1, jl_real b, const jl_real *x2,
                            int n)
 {
-    int r;
+    const jl_real *from = a < b ? x2 : x1;
+    const jl_real part = a < b ? a : -b;
+    int i = 0;
 
-    for (r = 0; r < n; r++)
-        d[r] = x1[r] - x2[r];
-    for (r = 0; r < n; r++)
-        x[r] = a < b ? x2[r] + a * d[r] : x1[r] - b * d[r];
+    JLI_BY_LANES(JLI_BETWEEN, n)
 }
 
-#define JLI_POOL_COLUMNS(type, width) \
-    for (; j + width <= n; j += width) \
-        *(type *)(P + r * n + j) += w[i] \
-            * (*(const type *)(Pi + r * n + j) + d[r] \
-               * (*(const type *)(xi + j) - *(const type *)(mean + j)));
+#define JLI_POOL_COLUMNS(type, width, end) \
+    for (; j < end; j += width) { \
+        const type dj = *(const type *)(xi + j) - *(const type *)(mean + j); \
+        for (r = 0; r < j + width; r++) \
+            *(type *)(P + r * n + j) += w[i] \
+                * (*(const type *)(Pi + r * n + j) + d[r] * dj); \
+    }
 
-#define JLI_DIFF(type, width) \
-    for (; j + width <= n; j += width) \
+#define JLI_DIFF(type, width, end) \
+    for (; j < end; j += width) \
         *(type *)(d + j) = *(const type *)(xi + j) - *(const type *)(mean + j);
 
 JL_INLINE void jli_full_pool(jl_real *JL_RESTRICT mean,
@@ -66,22 +74,16 @@ JL_INLINE void jli_full_pool(jl_real *JL_RESTRICT mean,
         const jl_real *xi = x + i * n, *Pi = Ps + i * n * n;
 
         j = 0;
-        JLI_DIFF(jli_wide, JLI_WIDE)
-        JLI_DIFF(jli_pack, JLI_PACK)
-        JLI_DIFF(jl_real, 1)
-        for (r = 0; r < n; r++) {
-            j = r - r % JLI_PACK;               /* from the diagonal on */
-            JLI_POOL_COLUMNS(jli_wide, JLI_WIDE)
-            JLI_POOL_COLUMNS(jli_pack, JLI_PACK)
-            JLI_POOL_COLUMNS(jl_real, 1)
-        }
+        JLI_BY_LANES(JLI_DIFF, n)
+        j = 0;
+        JLI_BY_LANES(JLI_POOL_COLUMNS, n)
     }
     jli_mirror(P, n);
 }
 
 /* All of P at once; symmetric because its terms are. */
-#define JLI_BLEND_COLUMNS(type, width) \
-    for (; s + width <= n; s += width) \
+#define JLI_BLEND_COLUMNS(type, width, end) \
+    for (; s < end; s += width) \
         *(type *)(P + r * n + s) = a * *(const type *)(P1 + r * n + s) \
             + b * *(const type *)(P2 + r * n + s) \
             + a * b * (d[r] * *(const type *)(d + s));
@@ -96,9 +98,7 @@ JL_INLINE void jli_full_blend(jl_real *x, jl_real *P, jl_real a,
     jli_between(x, d, a, x1, b, x2, n);
     for (r = 0; r < n; r++) {
         s = 0;
-        JLI_BLEND_COLUMNS(jli_wide, JLI_WIDE)
-        JLI_BLEND_COLUMNS(jli_pack, JLI_PACK)
-        JLI_BLEND_COLUMNS(jl_real, 1)
+        JLI_BY_LANES(JLI_BLEND_COLUMNS, n)
     }
 }
 

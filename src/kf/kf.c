@@ -109,9 +109,14 @@ static int absorb(jl_kf *kf, jl_real *loglik, const jl_real *xp,
     jl_innovation got;
 
     if (z != NULL) {
+        jl_real *rest = nu + kf->mode->m;
+
         got.nu = nu;
-        status = jli_gated_update(kf->x, kf->P, &got, kf->form, kf->mode, xp,
-                                  xp + n, z, gate, nu + kf->mode->m);
+        status = gate > 0
+            ? jli_gated_update(kf->x, kf->P, &got, kf->form, kf->mode, xp,
+                               xp + n, z, gate, rest)
+            : kf->form->update(kf->x, kf->P, &got, kf->mode, xp, xp + n, z,
+                               rest);
         if (status != JL_OK) {
             jli_copy(kf->x, before, size);
             return status;

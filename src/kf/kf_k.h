@@ -9,35 +9,26 @@
 
 #define JLI_LOG_2PI JL_C(1.8378770664093454836)
 
-/* A sum of squares, in any order, as it comes by rows. */
-struct jli_squares {
-    jli_wide wide;
-    jli_pack pack;
-    jl_real one;
-};
-
-#define JLI_SQUARES(type, width, sum) \
-    for (; i + width <= n; i += width) \
-        sum += *(const type *)(v + i) * *(const type *)(v + i);
+#define JLI_SQUARES(type, width, end) \
+    for (; i < end; i += width) \
+        sum->of_##type += *(const type *)(v + i) * *(const type *)(v + i);
 
 JL_INLINE void jli_square(struct jli_squares *sum, const jl_real *v, int n)
 {
     int i = 0;
 
-    JLI_SQUARES(jli_wide, JLI_WIDE, sum->wide)
-    JLI_SQUARES(jli_pack, JLI_PACK, sum->pack)
-    JLI_SQUARES(jl_real, 1, sum->one)
+    JLI_BY_LANES(JLI_SQUARES, n)
 }
 
 JL_INLINE jl_real jli_square_sum(const struct jli_squares *sum)
 {
-    jl_real lane[JLI_WIDE + JLI_PACK], s = sum->one;
+    jl_real s = sum->of_jl_real;
     int i;
 
-    *(jli_wide *)lane = sum->wide;
-    *(jli_pack *)(lane + JLI_WIDE) = sum->pack;
-    for (i = 0; i < JLI_WIDE + JLI_PACK; i++)
-        s += lane[i];
+    for (i = 0; i < JLI_PACK; i++)
+        s += JLI_LANE(sum->of_jli_pack, i);
+    for (i = 0; i < JLI_WIDE; i++)
+        s += JLI_LANE(sum->of_jli_wide, i);
     return s;
 }
 
@@ -52,21 +43,6 @@ JL_INLINE int jli_estimate_ok(const struct jli_squares *sum, const jl_real *x,
             && jl_vec_within(P, n * n, JL_LARGE * JL_LARGE));
 }
 
-/* C = A B + Q, known to be symmetric; A, B, Q [n,n] */
-JL_INLINE void jli_mul_sym(jl_real *JL_RESTRICT C, struct jli_squares *sum,
-                           const jl_real *JL_RESTRICT A,
-                           const jl_real *JL_RESTRICT B,
-                           const jl_real *JL_RESTRICT Q, int n)
-{
-    int i;
-
-    for (i = 0; i < n; i++) {
-        jli_row(C + i * n, Q + i * n, JLI_PLUS_ROW, A + i * n, 1, B, n, n);
-        jli_square(sum, C + i * n, n);
-    }
-    jli_mirror(C, n);
-}
-
 /* x- = f(x) + u, P- = F (P F') + W; scratch [3 n n + 3 n] */
 JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
                              const jl_real *x, const jl_real *P,
@@ -74,7 +50,7 @@ JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
 {
     const jl_real *F = mode->F;
     jl_real *T = scratch + n * n, *U = T + n * n;
-    struct jli_squares sum = { { 0 }, { 0 }, 0 };
+    struct jli_squares sum = { 0, { 0 }, { 0 } };
     int status;
 
     if (mode->move != NULL) {
@@ -85,10 +61,11 @@ JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
     }
     jli_transpose(T, F, n, n);
     if (mode->move == NULL)
-        jli_row(xp, mode->u, JLI_PLUS_ROW, x, 1, T, n, n);
+        jli_row(xp, mode->u, JLI_PLUS, x, 1, T, n, n);
     jli_mul(U, P, T, n, n, n);
     jli_square(&sum, xp, n);
-    jli_mul_sym(Pp, &sum, F, U, mode->W, n);
+    jli_product(Pp, mode->W, JLI_PLUS, F, n, 1, U, 1, &sum, n, n, n);
+    jli_mirror(Pp, n);
     return jli_estimate_ok(&sum, xp, Pp, n) ? JL_OK : JL_ENONFINITE;
 }
 
@@ -148,25 +125,17 @@ JL_INLINE jl_real jli_log_product(const jl_real *d, int m)
  *     y  [m]     D^-1/2 L^-1 nu, of the innovation's nu
  *     S  [m,m]   L below the diagonal
  *     r  [m]     D^-1/2
- *     nis = y'y,  loglik = -(m log 2 pi + log det D + nis) / 2
- * scratch [m] */
-JL_INLINE int jli_kf_innovate(jl_real *Y, jl_real *y, jl_real *S, jl_real *r,
-                              jl_innovation *innovation, const jl_real *H,
-                              const jl_real *R, const jl_real *Pp,
-                              jl_real *d, int n, int m)
+ *     d  [m]     D */
+JL_INLINE int jli_kf_innovate(jl_real *K, jl_real *Y, jl_real *y, jl_real *S, jl_real *r,
+                              jl_real *d, jl_innovation *innovation,
+                              const jl_real *H, const jl_real *R,
+                              const jl_real *Pp, int n, int m)
 {
-    jl_real twice = (jl_real)m * JLI_LOG_2PI, nis = 0;
-    int a, b, k, j, status;
+    jl_real nis = 0;
+    int a, status;
 
     jli_mul(Y, H, Pp, m, n, n);
-    for (a = 0; a < m; a++)
-        for (b = 0; b <= a; b++) {
-            jl_real s = R[a * m + b];
-
-            for (k = 0; k < n; k++)
-                s += Y[a * n + k] * H[b * n + k];
-            S[a * m + b] = s;
-        }
+    jli_mul_t_sym(S, Y, H, R, m, n);
     status = jli_ldl(S, d, r, m);
     if (status != JL_OK)
         return status == JL_EDEF ? JL_ESINGULAR : status;
@@ -175,14 +144,20 @@ JL_INLINE int jli_kf_innovate(jl_real *Y, jl_real *y, jl_real *S, jl_real *r,
     jli_unit_solve(S, Y, m, n);
     jli_unit_solve(S, y, m, 1);
     for (a = 0; a < m; a++) {
-        r[a] *= jli_sqrt(d[a]);
-        for (j = 0; j < n; j++)
-            Y[a * n + j] *= r[a];
-        y[a] *= r[a];
-        nis += y[a] * y[a];
+        jli_scale(K + a * n, r[a], Y + a * n, n);
+        nis += y[a] * (y[a] * r[a]);
     }
-    twice += jli_log_product(d, m) + nis;
     innovation->nis = nis;
+    return JL_OK;
+}
+
+/* The end of an update: loglik = -(m log 2 pi + log det D + nis) / 2. */
+JL_INLINE int jli_kf_likelihood(jl_innovation *innovation, const jl_real *d,
+                                int m)
+{
+    jl_real twice = (jl_real)m * JLI_LOG_2PI + jli_log_product(d, m)
+        + innovation->nis;
+
     innovation->loglik = -twice / 2;
     return jli_finite(twice) ? JL_OK : JL_ENONFINITE;
 }
@@ -197,54 +172,34 @@ JL_INLINE int jli_kf_update_joseph(jl_real *x, jl_real *P,
 {
     const jl_real *H;
     jl_real *K = scratch, *V = K + m * n, *S = V + m * n, *y = S + m * m;
-    jl_real *r = y + m, *d = r + m, *A = d + m, *T = A + n * n;
-    jl_real *U = T + n * n;
-    struct jli_squares sum = { { 0 }, { 0 }, 0 };
-    int i, j, a, status;
+    jl_real *r = y + m, *d = r + m, *A = d + m, *U = A + n * n;
+    jl_real *Q = U + n * n;
+    struct jli_squares sum = { 0, { 0 }, { 0 } };
+    int i, j, status;
 
     status = jli_kf_sense(innovation->nu, &H, mode, xp, z, U, n, m);
     if (status == JL_OK)
-        status = jli_kf_innovate(K, y, S, r, innovation, H, mode->R, Pp, d, n,
+        status = jli_kf_innovate(K, V, y, S, r, d, innovation, H, mode->R, Pp, n,
                                  m);
     if (status != JL_OK)
         return status;
-    jli_row(x, xp, JLI_PLUS_ROW, y, 1, K, m, n);
-    for (a = 0; a < m; a++)
-        for (j = 0; j < n; j++)
-            K[a * n + j] *= r[a];
+    jli_row(x, xp, JLI_PLUS, y, 1, K, m, n);
+    jli_square(&sum, x, n);
     jli_unit_t_solve(S, K, m, n);               /* K' = S^-1 H P-           */
-    for (i = 0; i < n; i++) {
+    jli_mul(V, mode->R, K, m, m, n);            /* R K'                     */
+    jli_product(Q, NULL, JLI_PRODUCT, K, 1, n, V, 1, NULL, n, m, n);
+    for (i = 0; i < n; i++)
         for (j = 0; j < n; j++)
             A[i * n + j] = (jl_real)(i == j);
-        jli_row(A + i * n, A + i * n, JLI_MINUS_ROW, K + i, n, H, m, n);
-    }
-    jli_transpose(T, A, n, n);
-    jli_mul(U, Pp, T, n, n, n);
-    jli_mul(V, mode->R, K, m, m, n);            /* R K'                     */
-    for (i = 0; i < n; i++)
-        jli_row(T + i * n, NULL, JLI_ROW, K + i, n, V, m, n);
-    jli_square(&sum, x, n);
-    jli_mul_sym(P, &sum, A, U, T, n);
-    return jli_estimate_ok(&sum, x, P, n) ? JL_OK : JL_ENONFINITE;
+    jli_product(A, A, JLI_MINUS, H, 1, n, K, 0, NULL, n, m, n);
+    jli_mul(U, Pp, A, n, n, n);
+    jli_product(P, Q, JLI_PLUS, A, 1, n, U, 1, &sum, n, n, n);
+    jli_mirror(P, n);
+    if (!jli_estimate_ok(&sum, x, P, n))
+        return JL_ENONFINITE;
+    return jli_kf_likelihood(innovation, d, m);
 }
 
-/* The same for P = P- - Y'Y of a P- that is within bounds.  Then its diagonal
- * tells: Y_i^2 <= P-_ii - P_ii in each of its columns i, and the other elements
- * of Y'Y are not larger than the greatest of the diagonal. */
-JL_INLINE int jli_update_ok(const jl_real *x, const jl_real *P, int n)
-{
-    jl_real sum = 0;
-    int i;
-
-    for (i = 0; i < n; i++)
-        sum += x[i] * x[i] + P[i * (n + 1)] * P[i * (n + 1)];
-    return sum <= JL_LARGE * JL_LARGE
-        || (jl_vec_within(x, n, JL_LARGE)
-            && jl_vec_within(P, n * n, JL_LARGE * JL_LARGE));
-}
-
-/* x = x- + Y'y, P = P- - Y'Y, symmetric because its terms are
- * scratch [2 n m + m m + 4 m + n] */
 JL_INLINE int jli_kf_update_standard(jl_real *x, jl_real *P,
                                      jl_innovation *innovation,
                                      const jl_mode *mode, const jl_real *xp,
@@ -253,19 +208,23 @@ JL_INLINE int jli_kf_update_standard(jl_real *x, jl_real *P,
 {
     const jl_real *H;
     jl_real *Y = scratch, *S = Y + m * n, *y = S + m * m, *r = y + m;
-    jl_real *d = r + m;
-    int i, status;
+    jl_real *d = r + m, *K = d + m;
+    struct jli_squares sum = { 0, { 0 }, { 0 } };
+    int status;
 
-    status = jli_kf_sense(innovation->nu, &H, mode, xp, z, d + m, n, m);
+    status = jli_kf_sense(innovation->nu, &H, mode, xp, z, K + n * m, n, m);
     if (status == JL_OK)
-        status = jli_kf_innovate(Y, y, S, r, innovation, H, mode->R, Pp, d, n,
+        status = jli_kf_innovate(K, Y, y, S, r, d, innovation, H, mode->R, Pp, n,
                                  m);
     if (status != JL_OK)
         return status;
-    jli_row(x, xp, JLI_PLUS_ROW, y, 1, Y, m, n);
-    for (i = 0; i < n; i++)
-        jli_row(P + i * n, Pp + i * n, JLI_MINUS_ROW, Y + i, n, Y, m, n);
-    return jli_update_ok(x, P, n) ? JL_OK : JL_ENONFINITE;
+    jli_row(x, xp, JLI_PLUS, y, 1, K, m, n);
+    jli_square(&sum, x, n);
+    jli_product(P, Pp, JLI_MINUS, K, 1, n, Y, 1, &sum, n, m, n);
+    jli_mirror(P, n);
+    if (!jli_estimate_ok(&sum, x, P, n))
+        return JL_ENONFINITE;
+    return jli_kf_likelihood(innovation, d, m);
 }
 
 #endif

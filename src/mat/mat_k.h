@@ -14,60 +14,100 @@ JL_INLINE void jli_copy(jl_real *to, const jl_real *from, int n)
     memcpy(to, from, (size_t)n * sizeof *to);
 }
 
-/* A row of a product: c = sum_k a_k B_k, or q plus or minus that; B_k [p] are
- * the rows of B, the a_k lie `step` apart, and c may be q.  Several columns at a
- * time, each sum in order of k. */
-enum { JLI_ROW, JLI_PLUS_ROW, JLI_MINUS_ROW };
+/* --- products ------------------------------------------------------------ */
 
-#define JLI_COLUMNS(type, width) \
-    for (; j + width <= p; j += width) { \
-        const jl_real *b = B + j; \
-        type s; \
-        if (how == JLI_ROW) { \
-            s = a[0] * *(const type *)b; \
-            for (k = 1; k < m; k++) \
-                s += a[k * step] * *(const type *)(b + k * p); \
-        } else { \
-            s = *(const type *)(q + j); \
-            for (k = 0; k < m; k++) \
-                if (how == JLI_PLUS_ROW) \
+/* C = A B, or Q plus or minus that: C, Q [n,p], B [m,p], element (i,k) of A at
+ * A[i * next + k * step]; C may be Q.  With `upper`, n = p and only the upper
+ * triangle, and a little beside it.  Columns are taken as many at a time as the
+ * machine can, the widest last; each sum is in order of k.
+ * The squares of the elements are added to *sum, unless it is NULL. */
+enum { JLI_PRODUCT, JLI_PLUS, JLI_MINUS };
+
+struct jli_squares {
+    jl_real of_jl_real;
+    jli_pack of_jli_pack;
+    jli_wide of_jli_wide;
+};
+
+#define JLI_COLUMNS(type, width, end) \
+    for (; j < end; j += width) \
+        for (i = 0; i < (upper ? j + width : n); i++) { \
+            const jl_real *a = A + i * next, *b = B + j; \
+            type s; \
+            if (how == JLI_PRODUCT) { \
+                s = a[0] * *(const type *)b; \
+                for (k = 1; k < m; k++) \
                     s += a[k * step] * *(const type *)(b + k * p); \
-                else \
-                    s -= a[k * step] * *(const type *)(b + k * p); \
-        } \
-        *(type *)(c + j) = s; \
-    }
+            } else { \
+                s = *(const type *)(Q + i * p + j); \
+                for (k = 0; k < m; k++) \
+                    if (how == JLI_PLUS) \
+                        s += a[k * step] * *(const type *)(b + k * p); \
+                    else \
+                        s -= a[k * step] * *(const type *)(b + k * p); \
+            } \
+            *(type *)(C + i * p + j) = s; \
+            if (sum != NULL) \
+                sum->of_##type += s * s; \
+        }
 
+JL_INLINE void jli_product(jl_real *C, const jl_real *Q, int how,
+                           const jl_real *JL_RESTRICT A, int next, int step,
+                           const jl_real *JL_RESTRICT B, int upper,
+                           struct jli_squares *sum, int n, int m, int p)
+{
+    int i, j = 0, k;
+
+    JLI_BY_LANES(JLI_COLUMNS, p)
+}
+
+/* One row: c = sum_k a_k B_k, or q plus or minus that; the a_k `step` apart. */
 JL_INLINE void jli_row(jl_real *c, const jl_real *q, int how,
                        const jl_real *JL_RESTRICT a, int step,
                        const jl_real *JL_RESTRICT B, int m, int p)
 {
-    int j = 0, k;
-
-    JLI_COLUMNS(jli_wide, JLI_WIDE)
-    JLI_COLUMNS(jli_pack, JLI_PACK)
-    JLI_COLUMNS(jl_real, 1)
+    jli_product(c, q, how, a, 0, step, B, 0, NULL, 1, m, p);
 }
 
-/* C = A B; B and C apart from each other */
+/* C = A B */
 JL_INLINE void jli_mul(jl_real *JL_RESTRICT C, const jl_real *JL_RESTRICT A,
                        const jl_real *JL_RESTRICT B, int n, int m, int p)
 {
-    int i;
-
-    for (i = 0; i < n; i++)
-        jli_row(C + i * p, NULL, JLI_ROW, A + i * m, 1, B, m, p);
+    jli_product(C, NULL, JLI_PRODUCT, A, m, 1, B, 0, NULL, n, m, p);
 }
 
-/* T = A', A [n,m] */
+/* y = a x */
+#define JLI_SCALE(type, width, end) \
+    for (; i < end; i += width) \
+        *(type *)(y + i) = a * *(const type *)(x + i);
+
+JL_INLINE void jli_scale(jl_real *y, jl_real a, const jl_real *x, int n)
+{
+    int i = 0;
+
+    JLI_BY_LANES(JLI_SCALE, n)
+}
+
+/* T = A', A [n,m]; stored in the pieces in which a product loads it. */
+#define JLI_GATHER(type, width, end) \
+    for (; i < end; i += width) { \
+        type s; \
+        for (k = 0; k < width; k++) \
+            JLI_LANE(s, k) = A[(i + k) * m + j]; \
+        *(type *)(T + j * n + i) = s; \
+    }
+
 JL_INLINE void jli_transpose(jl_real *JL_RESTRICT T,
                              const jl_real *JL_RESTRICT A, int n, int m)
 {
-    int i, j;
+    int i, j, k;
 
-    for (j = 0; j < m; j++)
-        for (i = 0; i < n; i++)
+    for (j = 0; j < m; j++) {
+        for (i = 0; i < n % JLI_PACK; i++)
             T[j * n + i] = A[i * m + j];
+        JLI_GATHER(jli_pack, JLI_PACK, n % JLI_WIDE)
+        JLI_GATHER(jli_wide, JLI_WIDE, n)
+    }
 }
 
 /* Make A [n,n] symmetric by its upper triangle. */
@@ -97,16 +137,18 @@ JL_INLINE void jli_mul_t(jl_real *C, const jl_real *A, const jl_real *B,
 }
 
 /* C = T A' + Q, known to be symmetric; T, A [n,m]; Q [n,n] or NULL. */
-JL_INLINE void jli_mul_t_sym(jl_real *C, const jl_real *T, const jl_real *A,
-                             const jl_real *Q, int n, int m)
+JL_INLINE void jli_mul_t_sym(jl_real *JL_RESTRICT C,
+                             const jl_real *JL_RESTRICT T,
+                             const jl_real *JL_RESTRICT A, const jl_real *Q,
+                             int n, int m)
 {
     int i, j, k;
 
     for (i = 0; i < n; i++)
         for (j = i; j < n; j++) {
-            jl_real s = 0;
+            jl_real s = T[i * m] * A[j * m];
 
-            for (k = 0; k < m; k++)
+            for (k = 1; k < m; k++)
                 s += T[i * m + k] * A[j * m + k];
             if (Q != NULL)
                 s += Q[i * n + j];
@@ -192,7 +234,7 @@ JL_INLINE void jli_unit_solve(const jl_real *L, jl_real *Y, int n, int m)
     int i;
 
     for (i = 1; i < n; i++)
-        jli_row(Y + i * m, Y + i * m, JLI_MINUS_ROW, L + i * n, 1, Y, i, m);
+        jli_row(Y + i * m, Y + i * m, JLI_MINUS, L + i * n, 1, Y, i, m);
 }
 
 /* L' X = Y in place, the same way */
@@ -201,7 +243,7 @@ JL_INLINE void jli_unit_t_solve(const jl_real *L, jl_real *X, int n, int m)
     int i;
 
     for (i = n - 2; i >= 0; i--)
-        jli_row(X + i * m, X + i * m, JLI_MINUS_ROW, L + (i + 1) * n + i, n,
+        jli_row(X + i * m, X + i * m, JLI_MINUS, L + (i + 1) * n + i, n,
                 X + (i + 1) * m, n - 1 - i, m);
 }
 
