@@ -118,7 +118,8 @@ extern const jl_kf_form jl_kf_unscented;        /* sigma points; factors    */
 #endif
 #define JL_KF_SIZE(n, m) \
     extern const jl_kf_form JL_KF_FIXED(joseph, n, m); \
-    extern const jl_kf_form JL_KF_FIXED(standard, n, m);
+    extern const jl_kf_form JL_KF_FIXED(standard, n, m); \
+    extern const jl_kf_form JL_KF_FIXED(sqrt, n, m);
 #include JL_KF_SIZES_FILE
 #undef JL_KF_SIZE
 

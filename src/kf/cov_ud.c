@@ -1,7 +1,7 @@
 /* Estimates that keep a factor of the covariance. */
 #include "kf/cov_ud_k.h"
 
-static void take(jl_real *S, const jl_real *P, jl_real *scratch, int n)
+void jli_ud_take(jl_real *S, const jl_real *P, jl_real *scratch, int n)
 {
     jl_mat_ud(S, P, scratch, n);
 }
@@ -27,7 +27,7 @@ static jl_real element(const jl_real *Sn, int r, int at, int n)
 }
 
 /* Columns are left out, and the rows made a triangle again. */
-static void part(jl_real *S, const jl_real *Sn, const int *map,
+void jli_ud_part(jl_real *S, const jl_real *Sn, const int *map,
                  jl_real *scratch, int k, int n)
 {
     int r, i;
@@ -41,7 +41,7 @@ static void part(jl_real *S, const jl_real *Sn, const int *map,
 }
 
 /* Still a triangle, for the map ascends; D of what it leaves out is var. */
-static void whole(jl_real *Sn, const jl_real *S, const int *map,
+void jli_ud_whole(jl_real *Sn, const jl_real *S, const int *map,
                   const jl_real *var, int k, int n)
 {
     int i, j;
@@ -54,5 +54,6 @@ static void whole(jl_real *Sn, const jl_real *S, const int *map,
             Sn[map[i] * n + map[j]] = S[i * k + j];
 }
 
-const jl_cov jl_cov_ud = { 1, take, jl_mat_ud_product, pool, blend, part,
-                           whole };
+const jl_cov jl_cov_ud = {
+    1, jli_ud_take, jl_mat_ud_product, pool, blend, jli_ud_part, jli_ud_whole
+};

@@ -8,6 +8,18 @@
 #include "kf/cov_k.h"
 #include "mat/ud_k.h"
 
+#if JL_REAL_FLOAT
+#define jli_ud_take jli_ud_take_f32
+#define jli_ud_part jli_ud_part_f32
+#define jli_ud_whole jli_ud_whole_f32
+#endif
+
+void jli_ud_take(jl_real *S, const jl_real *P, jl_real *scratch, int n);
+void jli_ud_part(jl_real *S, const jl_real *Sn, const int *map,
+                 jl_real *scratch, int k, int n);
+void jli_ud_whole(jl_real *Sn, const jl_real *S, const int *map,
+                  const jl_real *var, int k, int n);
+
 /* S = w S1; may be S1 */
 JL_INLINE void jli_ud_scale(jl_real *S, const jl_real *S1, jl_real w, int n)
 {

@@ -7,7 +7,8 @@ struct entry {
 
 #define JL_KF_SIZE(N, M) \
     { &jl_kf_joseph, &JL_KF_FIXED(joseph, N, M) }, \
-    { &jl_kf_standard, &JL_KF_FIXED(standard, N, M) },
+    { &jl_kf_standard, &JL_KF_FIXED(standard, N, M) }, \
+    { &jl_kf_sqrt, &JL_KF_FIXED(sqrt, N, M) },
 
 static const struct entry entries[] = {
 #include JL_KF_SIZES_FILE

@@ -220,7 +220,7 @@ JL_INLINE int jli_kf_update_standard(jl_real *x, jl_real *P,
         return status;
     jli_row(x, xp, JLI_PLUS, y, 1, K, m, n);
     jli_square(&sum, x, n);
-    jli_product(P, Pp, JLI_MINUS, K, 1, n, Y, 1, &sum, n, m, n);
+    jli_product(P, Pp, JLI_MINUS, Y, 1, n, K, 1, &sum, n, m, n);
     jli_mirror(P, n);
     if (!jli_estimate_ok(&sum, x, P, n))
         return JL_ENONFINITE;
