@@ -252,7 +252,17 @@ static void test_par_sizes_give_serial_bits(void **state)
 /* The metric of a reference case: x in sigmas, P by sigmas, mu absolute, the
  * log-likelihood by 1 + |loglik|.  The limits are those of ordinary cases up
  * to the outlier, of 1000 sigma; of the last steps, whose measurements are
- * absurd, only the status is compared. */
+ * absurd, only the status is compared; not even that where the step before came
+ * so near to what a state may be that rounding decides. */
+static int near_the_limit(const struct par_trace *b, int k)
+{
+    int i, near = 0;
+
+    for (i = 0; k > 0 && i < PAR_N; i++)
+        near |= fabs((double)b->x[k - 1][i]) > (double)JL_LARGE / 4;
+    return near;
+}
+
 static void assert_close_trace(const struct par_trace *a,
                                const struct par_trace *b)
 {
@@ -262,7 +272,8 @@ static void assert_close_trace(const struct par_trace *a,
         double within = JL_REAL_FLOAT ? (k < 25 ? 2e-3 : 1e-1)
             : (k < 25 ? 1e-11 : 1e-9);
 
-        assert_int_equal(a->status[k], b->status[k]);
+        if (!near_the_limit(b, k))
+            assert_int_equal(a->status[k], b->status[k]);
         if (k >= 50)
             continue;
         for (i = 0; i < PAR_N; i++) {
