@@ -160,7 +160,7 @@ static void print_table(const struct flight_report *r, FILE *out)
                 : options_port_name(r->options->port),
             options_topology(r->options),
             r->options->exchange == JL_EXCHANGE_REDUCE ? ", all-reduce" : "",
-            r->options->form == &jl_kf_joseph ? "Joseph" : "standard",
+            options_form(r->options),
             JL_REAL_FLOAT ? "float" : "double");
     if (r->options->gate > 0)
         fprintf(out, ", gate %.17g", r->options->gate);

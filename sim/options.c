@@ -129,11 +129,24 @@ const char *options_topology(const struct options *o)
     return topologies[o->topology];
 }
 
+static const char *const forms[] = { "joseph", "standard", "sqrt", NULL };
+static const jl_kf_form *const form_of[] = {
+    &jl_kf_joseph, &jl_kf_standard, &jl_kf_sqrt
+};
+
+const char *options_form(const struct options *o)
+{
+    int i = 0;
+
+    while (form_of[i] != o->form)
+        i++;
+    return forms[i];
+}
+
 int options_take(struct options *o, int c, char *const *argv)
 {
     const char *value = optarg;
     static const char *const filters[] = { "imm", "kf", NULL };
-    static const char *const forms[] = { "joseph", "standard", NULL };
     static const char *const holds[] = { "none", "detect", "column", NULL };
     static const char *const exchanges[] = { "gather", "reduce", NULL };
     long number = 0;
@@ -151,8 +164,10 @@ int options_take(struct options *o, int c, char *const *argv)
         return status;
     case 1003:
         i = choose(o->command, "form", value, forms);
-        o->form = i == 1 ? &jl_kf_standard : &jl_kf_joseph;
-        return i < 0 ? 2 : 0;
+        if (i < 0)
+            return 2;
+        o->form = form_of[i];
+        return 0;
     case 1004:
         i = choose(o->command, "hold", value, holds);
         o->hold = (enum hold)(i + HOLD_NONE);

@@ -65,8 +65,8 @@ struct options {
 #define COMMON_HELP \
     "  --filter imm|kf   all modes (default), or the Kalman filter of one\n" \
     "  --mode J          ... of this one, from 0 (default: the only one)\n" \
-    "  --form joseph|standard  how covariances are updated (default\n" \
-    "                    joseph)\n" \
+    "  --form joseph|standard|sqrt  how covariances are kept and updated\n" \
+    "                    (default joseph; sqrt: as factors)\n" \
     "  --gate P          reject outliers, which no mode expects: a good\n" \
     "                    measurement passes with probability P (0.9999)\n" \
     "  --gate-most N     ... until N were rejected in a row; then it is the\n" \
@@ -120,6 +120,9 @@ jl_real options_gate(const struct options *options, int m);
 
 /* The topology's name. */
 const char *options_topology(const struct options *options);
+
+/* The form's name: "joseph". */
+const char *options_form(const struct options *options);
 
 /* getopt_long's short options: those of COMMON_OPTIONS, and no words of its
  * own about wrong ones. */

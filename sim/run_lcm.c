@@ -75,7 +75,7 @@ static void become_pe(int pe, const char *url, const char *run,
         argv[n++] = "reduce";
     }
     argv[n++] = "--form";
-    argv[n++] = options->form == &jl_kf_joseph ? "joseph" : "standard";
+    argv[n++] = options_form(options);
     if (options->kf) {
         argv[n++] = "--filter";
         argv[n++] = "kf";

@@ -29,17 +29,19 @@ int run_slots(const struct options *options)
 jl_u32 run_fingerprint(const struct model *model,
                        const struct options *options)
 {
-    unsigned char more[6 + 4 + JL_REAL_OCTETS];
+    const char *form = options_form(options);
+    unsigned char more[5 + 4 + JL_REAL_OCTETS];
+    jl_u32 crc = jl_crc32(model->fingerprint, (const unsigned char *)form,
+                          (int)strlen(form));
 
     more[0] = (unsigned char)options->pes;
-    more[1] = options->form == &jl_kf_joseph;
-    more[2] = (unsigned char)(options->kf ? options->mode + 2 : 0);
-    more[3] = JL_REAL_OCTETS;
-    more[4] = (unsigned char)options->topology;
-    more[5] = (unsigned char)options->exchange;
-    jl_put_u32(more + 6, (jl_u32)options->gate_most);
-    jl_put_real(more + 10, options_gate(options, model->m));
-    return jl_crc32(model->fingerprint, more, sizeof more);
+    more[1] = (unsigned char)(options->kf ? options->mode + 2 : 0);
+    more[2] = JL_REAL_OCTETS;
+    more[3] = (unsigned char)options->topology;
+    more[4] = (unsigned char)options->exchange;
+    jl_put_u32(more + 5, (jl_u32)options->gate_most);
+    jl_put_real(more + 9, options_gate(options, model->m));
+    return jl_crc32(crc, more, sizeof more);
 }
 
 /* "PE0: no word from PE2: nothing happened before the deadline" */

@@ -96,6 +96,36 @@ extern const jl_kf_form jl_kf_standard;
 extern const jl_kf_form jl_kf_sqrt;     /* factors U' D U                   */
 extern const jl_kf_form jl_kf_unscented;        /* sigma points; factors    */
 
+/* The form unscented (Julier, Uhlmann, Durrant-Whyte 2000) takes the functions
+ * of a nonlinear mode at 2 n + 1 points,
+ *     x, weight kappa / (n + kappa), and, for P = U' D U,
+ *     x +- sqrt((n + kappa) D_k) U_k, weight 1 / 2 (n + kappa) each,
+ * and the means and covariances of their values; matrices as the form sqrt.  It
+ * needs no Jacobian, and where a Jacobian misses how much a function bends
+ * within a deviation it is the better one.  kappa = 0 is the cubature rule
+ * (Arasaratnam, Haykin 2009); 3 - n, for n <= 3, has a normal distribution's
+ * fourth moments along the points.  As no weight is negative, covariances stay
+ * positive semidefinite.  Leading multiplications: predict 3 n^3, update 3 n^2 m,
+ * with 2 n + 1 calls each. */
+
+/* Forms of fixed size, for the sizes that kf_sizes.def lists: the same bits in
+ * a fraction of the time, for more code.
+ *     &JL_KF_FIXED(standard, 6, 3)    form standard, n = 6, m = 3 */
+#if JL_REAL_FLOAT
+#define JL_KF_FIXED(form, n, m) jl_kf_##form##_##n##_##m##_f32
+#else
+#define JL_KF_FIXED(form, n, m) jl_kf_##form##_##n##_##m
+#endif
+#define JL_KF_SIZE(n, m) \
+    extern const jl_kf_form JL_KF_FIXED(joseph, n, m); \
+    extern const jl_kf_form JL_KF_FIXED(standard, n, m);
+#include JL_KF_SIZES_FILE
+#undef JL_KF_SIZE
+
+/* The form's equal of fixed size n, m, if there is one; else the form itself.
+ * A program that calls it links them all. */
+const jl_kf_form *jl_kf_fixed(const jl_kf_form *form, int n, int m);
+
 #define JL_FORM_SCRATCH(n, m) \
     (3 * (n) * (n) + 4 * (n) * (m) + 2 * (m) * (m) + 5 * ((n) + (m)))
 

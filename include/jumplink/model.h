@@ -57,8 +57,9 @@ struct jl_mode {
  * *mode is untouched on error. */
 int jl_mode_init(jl_mode *mode, int n, int m, int p, jl_real *mem, int cap);
 
-/* Give a mode its matrices (copied): F [n,n] G [n,p] Q [p,p] w_bar [p] or NULL
- * for 0, H [m,n] R [m,m]; scratch [JL_MODE_SCRATCH(n, m, p)].
+/* Give a mode its matrices (copied): F [n,n] G [n,p] Q [p,p] w_bar [p], H [m,n]
+ * R [m,m]; scratch [JL_MODE_SCRATCH(n, m, p)].  NULL for w_bar is 0, and so it
+ * is for F and H, in modes that have functions in their place.
  * Q must be positive semidefinite, R positive definite.
  * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF; *mode is untouched on
  * error. */
@@ -71,9 +72,13 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
 /* What a mode does that no matrix says, with the noises of its mode:
  *     x(k+1) = f(x(k)) + G (w + w_bar),     z(k) = h(x(k)) + v
  * Each function returns JL_OK, or a negative code of base.h that ends the step
- * (a bearing has no value at range 0: JL_ERANGE); context is handed to each.
+ * (a bearing has no value at range 0: JL_ERANGE).  It must depend on nothing
+ * but its arguments and what context points to, and be the same on every PE;
+ * same bits everywhere need base.h's elementary functions.
  * The forms joseph, standard and sqrt linearise f at the estimate and h at the
- * prediction (extended Kalman filter); the form unscented does not. */
+ * prediction (extended Kalman filter: Jazwinski 1970, theorem 8.1); the form
+ * unscented does not.  States are averaged as they are: an angle among them
+ * must not be wrapped. */
 typedef struct jl_nonlinear {
     /* y [n] = f(x), x [n]; NULL: the mode's F x */
     int (*f)(jl_real *y, const jl_real *x, void *context);
@@ -83,28 +88,37 @@ typedef struct jl_nonlinear {
     int (*h)(jl_real *z, const jl_real *x, void *context);
     /* H [m,n] = dh/dx at x; NULL: by central differences */
     int (*jacobian_h)(jl_real *H, const jl_real *x, void *context);
-    /* d [m] = a - b, with angles brought to [-pi, pi); d may be a or b.  NULL:
-     * the plain difference. */
+    /* d [m] = a - b, with angles brought to [-pi, pi), of measurements or of
+     * differences; d may be a or b.  NULL: the plain difference. */
     void (*residual)(jl_real *d, const jl_real *a, const jl_real *b,
                      void *context);
     void *context;
+    jl_real kappa;              /* >= 0, usually 0: spread of the points of the
+                                   form unscented (kf.h)                    */
 } jl_nonlinear;
 
 /* Make a mode, which has its noises by jl_mode_set or jl_mode_motion,
  * nonlinear; NULL makes it linear again.  *nonlinear outlives the mode, which
- * later calls of jl_mode_set and jl_mode_motion leave nonlinear. */
-void jl_mode_nonlinear(jl_mode *mode, const jl_nonlinear *nonlinear);
+ * later calls of jl_mode_set and jl_mode_motion leave nonlinear, and
+ * jl_mode_init makes linear.
+ * Returns JL_OK, or JL_ERANGE (kappa not finite or below 0): *mode is
+ * untouched. */
+int jl_mode_nonlinear(jl_mode *mode, const jl_nonlinear *nonlinear);
 
 /* x- and, unless F is NULL, the Jacobian of a mode at x:
  *     xp [n] = f(x) + u, or F x + u;  F [n,n];  x [n];  scratch [3 n]
- * A numerical Jacobian has steps of eps^(1/3) max(|x_i|, 1).
- * Returns JL_OK, or the code of a function of the mode's. */
+ * A numerical Jacobian takes 2 n calls of f with steps of eps^(1/3) s, s =
+ * max(|x_i|, 1).  Its error is about eps^(2/3) (s^2 |f'''| / 6 + |f| / s);
+ * eps^(2/3) = 4e-11 (float: 2e-5).
+ * Returns JL_OK, JL_ENONFINITE (a function gave NaN, or more than JL_LARGE), or
+ * the code of a function. */
 int jl_mode_move(jl_real *xp, jl_real *F, const jl_mode *mode,
                  const jl_real *x, jl_real *scratch);
 
 /* The innovation and, unless H is NULL, the Jacobian of a mode at x:
  *     nu [m] = z - h(x), or z - H x;  H [m,n];  z [m];  scratch [n + 2 m]
- * Returns JL_OK, or the code of a function of the mode's. */
+ * Differences are the residual's, also in a numerical Jacobian.
+ * Returns as jl_mode_move. */
 int jl_mode_sense(jl_real *nu, jl_real *H, const jl_mode *mode,
                   const jl_real *z, const jl_real *x, jl_real *scratch);
 

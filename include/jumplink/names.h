@@ -46,6 +46,7 @@
 #define jl_kf_standard jl_kf_standard_f32
 #define jl_kf_sqrt jl_kf_sqrt_f32
 #define jl_kf_unscented jl_kf_unscented_f32
+#define jl_kf_fixed jl_kf_fixed_f32
 #define jl_kf_init jl_kf_init_f32
 #define jl_kf_set jl_kf_set_f32
 #define jl_kf_cov jl_kf_cov_f32

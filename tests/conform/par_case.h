@@ -25,7 +25,12 @@ struct par_shape {
                                    nobody does                              */
     int gate;                   /* a gate, and bursts of outliers           */
     int sizes;                  /* some modes lack components               */
+    int nonlinear;              /* two of three modes are                   */
 };
+
+static const jl_kf_form *const par_forms[] = { &jl_kf_joseph, &jl_kf_standard,
+                                               &jl_kf_sqrt };
+#define PAR_FORMS 3
 
 #define PAR_ASLEEP_US 1000000000L
 
@@ -38,6 +43,7 @@ struct par_bank {
     jl_real Pi[PAR_MOST * PAR_MOST];
     jl_motion motions[PAR_MOST];
     const int *map[PAR_MOST];
+    jl_nonlinear nonlinear[PAR_MOST];
     jl_imm imm;
     jl_chan *silent;            /* nothing ever comes here                  */
     int hangs_at;               /* or -1                                    */
@@ -149,6 +155,66 @@ static inline void par_bank_gate(struct par_bank *bank, int sticky)
     assert_int_equal(jl_imm_gate(&bank->imm, JL_C(13.82), JL_GATE_MOST), 0);
 }
 
+/* --- nonlinear modes ------------------------------------------------------ */
+
+/* The faster, the more the velocity turns; context is the mode's motion.  Where
+ * the measurements that are absurd have led there is no sine, but a code. */
+static inline int par_f(jl_real *y, const jl_real *x, void *context)
+{
+    const jl_motion *motion = context;
+    jl_real s, c, angle = x[1] * x[3] * JL_C(1e-6) + motion->turn_rate;
+    int status = jl_sincos(&s, &c, angle);
+
+    if (status != JL_OK)
+        return status;
+    y[1] = c * x[1] - s * x[3];
+    y[3] = s * x[1] + c * x[3];
+    y[0] = x[0] + (x[1] + y[1]) / 2;
+    y[2] = x[2] + (x[3] + y[3]) / 2;
+    return JL_OK;
+}
+
+static inline int par_h(jl_real *z, const jl_real *x, void *context)
+{
+    jl_real s, c;
+    int status = jl_sincos(&s, &c, x[0] / 1000);
+
+    (void)context;
+    z[0] = x[0] + 30 * s;
+    z[1] = x[2] + 30 * c;
+    return status;
+}
+
+static inline void par_residual(jl_real *d, const jl_real *a,
+                                const jl_real *b, void *context)
+{
+    (void)context;
+    d[0] = a[0] - b[0];
+    d[1] = a[1] - b[1];
+}
+
+static inline void par_bank_bend(struct par_bank *bank)
+{
+    int j;
+
+    for (j = 0; j < bank->imm.M; j++) {
+        jl_nonlinear *how = &bank->nonlinear[j];
+
+        memset(how, 0, sizeof *how);
+        how->h = par_h;
+        how->context = &bank->motions[j];
+        if (j % 3 == 1) {
+            how->f = par_f;
+            how->residual = par_residual;
+            how->kappa = 1;
+        }
+        if (j % 3 > 0)
+            assert_int_equal(jl_mode_nonlinear(&bank->modes[j], how), 0);
+    }
+}
+
+/* --- running it ------------------------------------------------------------ */
+
 /* A model that changes now and then, in a prepare that spoils the scratch. */
 static inline int par_prepare(void *context, jl_imm *imm, const jl_meas *meas)
 {
@@ -235,6 +301,8 @@ static inline void par_serial(struct par_trace *trace,
         par_bank_sizes(&bank);
     if (shape->gate)
         par_bank_gate(&bank, shape->sticky);
+    if (shape->nonlinear)
+        par_bank_bend(&bank);
     for (k = 0; k < PAR_STEPS; k++) {
         par_meas(&meas, z, k);
         if (shape->gate)
@@ -265,6 +333,8 @@ static inline int par_pe(int pe, const struct par_shape *shape, jl_chan **to,
         par_bank_sizes(bank);
     if (shape->gate)
         par_bank_gate(bank, shape->sticky);
+    if (shape->nonlinear)
+        par_bank_bend(bank);
     bank->silent = from[pe];
     bank->hangs_at = shape->hangs == pe ? shape->hangs_at : -1;
     if (bank->hangs_at == 0)

@@ -95,6 +95,7 @@ static void compare_all(int gate)
          s.topology++)
         for (s.npe = 1; s.npe <= 8; s.npe++) {
             s.sticky = s.npe % 2;
+            s.form = par_forms[s.npe / 2 % PAR_FORMS];
             compare(&s);
         }
 }

@@ -47,7 +47,7 @@ static void compare_all(int gate)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
     struct par_shape *s = &run.shape;
-    int slots, forms;
+    int slots, f;
 
     s->M = PAR_M;
     s->gate = gate;
@@ -56,9 +56,8 @@ static void compare_all(int gate)
         for (s->npe = 1; s->npe <= 8; s->npe++)
             for (s->sticky = 0; s->sticky < 2; s->sticky++)
                 for (slots = 0; slots <= 2; slots++)
-                    for (forms = 0; forms < 2; forms++) {
-                        s->form = forms == 0 ? &jl_kf_joseph
-                                             : &jl_kf_standard;
+                    for (f = 0; f < PAR_FORMS; f++) {
+                        s->form = par_forms[f];
                         compare(&run, slots);
                     }
 }
@@ -75,11 +74,26 @@ static void test_par_gate_gives_serial_bits_on_threads(void **state)
     compare_all(1);
 }
 
+static void test_par_gives_serial_bits_with_functions(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .nonlinear = 1 } };
+    struct par_shape *s = &run.shape;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->npe = 1; s->npe <= 8; s->npe++) {
+        s->form = s->npe % 2 ? &jl_kf_unscented : &jl_kf_joseph;
+        compare(&run, 1);
+        s->sticky = !s->sticky;
+    }
+}
+
 int main(void)
 {
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_on_threads),
         cmocka_unit_test(test_par_gate_gives_serial_bits_on_threads),
+        cmocka_unit_test(test_par_gives_serial_bits_with_functions),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -38,6 +38,8 @@ static const struct tolerance ordinary = { 2e-2, 2e-3, 2e-3, 1e-3 };
 #else
 static const struct tolerance ordinary = { 1e-10, 1e-11, 1e-11, 1e-11 };
 static const struct tolerance hard = { 5e-3, 2e-4, 5e-6, 5e-7 };
+static const struct tolerance hard_sqrt = { 5e-3, 2e-7, 5e-8, 2e-7 };
+static const struct tolerance hardest = { 1e-4, 1e-5, 1e-9, 1e-7 };
 #endif
 
 static int ascending(const void *a, const void *b)
@@ -152,9 +154,14 @@ static void test_filter_meets_reference(void **state)
     for (i = 0; i < CASES; i++) {
         check_case(cases[i].name, cases[i].n, "joseph", &ordinary);
         check_case(cases[i].name, cases[i].n, "standard", &ordinary);
+        check_case(cases[i].name, cases[i].n, "sqrt", &ordinary);
     }
+    check_case("hard_near", 3, "sqrt", &ordinary);
 #if !JL_REAL_FLOAT
     check_case("hard", 3, "joseph", &hard);
+    check_case("hard", 3, "sqrt", &hard_sqrt);
+    check_case("hardest", 3, "sqrt", &hardest);
+    check_case("hardest_near", 3, "sqrt", &ordinary);
 #endif
 }
 
@@ -240,10 +247,11 @@ static void test_filter_all_reduce_meets_serial(void **state)
         snprintf(model, sizeof model, GOLDEN "%s/model.json", cases[i].name);
         snprintf(data, sizeof data, GOLDEN "%s/z.csv", cases[i].name);
         serial = filtered(model, data);
-        for (k = 0; k < 12; k++) {
+        for (k = 0; k < 24; k++) {
             reduced = filtered(model, data, "--port", "loop", "--pes",
-                               pes[k % 3], "--topology", topologies[k / 3],
-                               "--exchange", "reduce");
+                               pes[k % 3], "--topology", topologies[k / 6],
+                               "--exchange", "reduce", "--form",
+                               k / 3 % 2 ? "sqrt" : "joseph");
             check_close(reduced, serial, cases[i].n, &close);
             free(reduced);
         }
@@ -268,6 +276,7 @@ static void test_filter_parallel_sticky_chain(void **state)
     const char *data = program_head("bank12.csv", GOLDEN "bank12/z.csv", 101);
     char *serial = filtered(model, data);
     char *standard = filtered(model, data, "--form", "standard");
+    char *factors = filtered(model, data, "--form", "sqrt");
 
     (void)state;
     same_for_all_pes("loop", serial, model, data);
@@ -276,9 +285,14 @@ static void test_filter_parallel_sticky_chain(void **state)
     same_on("loop", "4", standard, model, data, "--form", "standard");
     same_on("threads", "4", standard, model, data, "--form", "standard");
     same_on("lcm", "4", standard, model, data, "--form", "standard");
+    same_on("loop", "4", factors, model, data, "--form", "sqrt");
+    same_on("threads", "4", factors, model, data, "--form", "sqrt");
+    same_on("lcm", "4", factors, model, data, "--form", "sqrt");
     assert_true(strcmp(serial, standard) != 0);
+    assert_true(strcmp(serial, factors) != 0);
     free(serial);
     free(standard);
+    free(factors);
 }
 
 static void test_filter_parallel_general_chain(void **state)
@@ -801,7 +815,8 @@ static void test_filter_options_with_wrong_values(void **state)
     (void)state;
     refused("--filter|foo|imm, kf", "filter", CVCA3, "--filter", "foo");
     refused("--filter", "filter", CVCA3, "--filter", "");
-    refused("--form|sqrt", "filter", CVCA3, "--form", "sqrt");
+    refused("--form|square|joseph, standard, sqrt", "filter", CVCA3, "--form",
+            "square");
     refused("--hold|foo|none, detect, column", "filter", CVCA3, "--hold",
             "foo");
     refused("--port|udp|loop, threads, lcm", "filter", CVCA3, "--port", "udp");
