@@ -7,6 +7,8 @@
 #include "data_file.h"
 #include "model_file.h"
 
+struct diagnostics;
+
 struct estimates {
     long rows, room;            /* of rows there is memory for `room`       */
     long done;                  /* behind the last with an estimate         */
@@ -16,6 +18,7 @@ struct estimates {
     jl_real *P;                 /* [rows,n,n]                               */
     jl_real *mu;                /* [rows,M]                                 */
     jl_real *loglik;            /* [rows]                                   */
+    struct diagnostics *diagnostics;    /* more columns; or NULL            */
     double *us;                 /* [rows] wall clock of the step; NaN in a
                                    row without one (the start is none)      */
 };
@@ -47,8 +50,8 @@ double estimates_apart(const struct estimates *a, const struct estimates *b);
 long estimates_times(const struct estimates *e, double *median_us,
                      double *p99_us);
 
-/* As CSV: time (and run), x, P upper triangle, mu, loglik; all rows, or, when
- * `partial`, those that were done and a last line that says so. */
+/* As CSV: time (and run), x, P upper triangle, mu, loglik, and diagnostics if
+ * there are; all rows, or, when `partial`, those that were done and a last line that says so. */
 void estimates_write(const struct estimates *e, const struct data_file *data,
                      int partial, FILE *out);
 

@@ -37,6 +37,8 @@ struct options {
     const char *run;            /* name of an LCM run, or NULL              */
     struct live_input *live;    /* rows come from there, one by one; or NULL */
     const char *z, *time;       /* columns of the data                      */
+    int diagnostics;            /* more columns of the estimates            */
+    const char *truth;          /* columns of the true state, "a,-,b"; NULL */
     const char *out;            /* -o or --out                              */
 };
 

@@ -6,6 +6,7 @@
 #include "bank.h"
 #include "clock.h"
 #include "complain.h"
+#include "diagnostics.h"
 #include "interrupt.h"
 #include "progress.h"
 
@@ -39,6 +40,8 @@ int run_serial(struct estimates *e, const struct model *model,
                            status == JL_OK ? clock_us() - before
                                            : (double)NAN);
             estimates_judge(e, imm->verdict);
+            if (e->diagnostics != NULL)
+                diagnostics_note(e->diagnostics, row, imm);
         }
         if (status == JL_STARTED)
             status = JL_OK;

@@ -105,8 +105,8 @@ extern const jl_kf_form jl_kf_unscented;        /* sigma points; factors    */
  * within a deviation it is the better one.  kappa = 0 is the cubature rule
  * (Arasaratnam, Haykin 2009); 3 - n, for n <= 3, has a normal distribution's
  * fourth moments along the points.  As no weight is negative, covariances stay
- * positive semidefinite.  Leading multiplications: predict 3 n^3, update 3 n^2 m,
- * with 2 n + 1 calls each. */
+ * positive semidefinite.  Leading multiplications: predict 3 n^3, update
+ * 3 n^2 m, with 2 n + 1 calls each. */
 
 /* Forms of fixed size, for the sizes that kf_sizes.def lists: the same bits in
  * a fraction of the time, for more code.

@@ -76,7 +76,7 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
  * but its arguments and what context points to, and be the same on every PE;
  * same bits everywhere need base.h's elementary functions.
  * The forms joseph, standard and sqrt linearise f at the estimate and h at the
- * prediction (extended Kalman filter: Jazwinski 1970, theorem 8.1); the form
+ * prediction (extended Kalman filter: Jazwinski 1970, chapter 8); the form
  * unscented does not.  States are averaged as they are: an angle among them
  * must not be wrapped. */
 typedef struct jl_nonlinear {

@@ -1,8 +1,8 @@
 /* The form unscented, for any size: a function by its values at sigma points.
  *
- * The points about x are x itself and x +- c_k U_k, c_k^2 = (n + kappa) D_k: the
- * rows of P's factor, so no P is built and none decomposed.  (Julier, Uhlmann,
- * Durrant-Whyte 2000, IEEE Trans. Automatic Control 45, 477; with kappa = 0, the
+ * The points about x are x and x +- c_k U_k, c_k^2 = (n + kappa) D_k: the rows
+ * of P's factor, so no P is built and none decomposed.  (Julier, Uhlmann,
+ * Durrant-Whyte 2000, IEEE Trans. Automatic Control 45, 477; kappa = 0 is the
  * cubature rule of Arasaratnam, Haykin 2009, same journal 54, 1254.)  Of the
  * values y0, y+, y- of a pair only a difference and a bend are needed:
  *     a_k   = y+ - y-,  b_k = y+ + y- - 2 y0
@@ -11,14 +11,14 @@
  *     cov   = sum (a_k a_k' + (b_k - 2 shift)(b_k - 2 shift)') / 4 (n + kappa)
  *             + kappa / (n + kappa) shift shift'
  * which is the usual sum over points, each pair turned by 45 degrees: of a
- * linear function b_k is 0, and a_k = 2 c_k F U_k'.  Angles are safe, since only
+ * linear function b_k is 0, and a_k = 2 c_k F U_k'.  Angles are safe, for only
  * differences from y0 are averaged.
  *
- * No weight is negative, so what is absorbed into a factor keeps it one, and
- * nothing can fail to be positive semidefinite.  That is why there is no alpha:
- * the usual 1e-3 puts the points within 1e-3 sigma, where the weights are -1e6
- * and 1e6 / 2n, float differences have lost their digits, and a covariance is
- * what 1e6 times itself leaves. */
+ * No weight is negative, so rows are only ever added to a factor, and nothing
+ * can fail to be positive semidefinite.  That is why there is no alpha: the
+ * usual 1e-3 puts the points within 1e-3 sigma, where the weights are -1e6 and
+ * 1e6 / 2n, float differences have lost their digits, and a covariance is what
+ * is left of 1e6 times itself. */
 #include "kf/sqrt_k.h"
 
 /* A function of a mode's, n states to m values. */
@@ -158,8 +158,8 @@ static int predict(jl_real *xp, jl_real *Sp, const jl_mode *mode,
 /* --- update -------------------------------------------------------------- */
 
 /* T [m+n,m+n] = the factor of the covariance of (z, x) together: of the rows
- * (a_k, 2 c_k U_k), and (V, 0) for what z has of its own.  From the last row on,
- * for then each finds its own row of T empty when its x-part is reached.
+ * (a_k, 2 c_k U_k), and (V, 0) for what z has of its own.  From the last row
+ * on, for then each finds its own row of T empty when its x-part is reached.
  * v [m+n] work */
 static void join(jl_real *T, const jl_real *V, const jl_real *a,
                  const struct map *h, const jl_real *S, jl_real *v)

@@ -24,8 +24,8 @@ struct par_shape {
     int hangs_at;               /* ... at this measurement; 0: at once; -1:
                                    nobody does                              */
     int gate;                   /* a gate, and bursts of outliers           */
-    int sizes;                  /* some modes lack components               */
     int nonlinear;              /* two of three modes are                   */
+    int sizes;                  /* some modes lack components               */
 };
 
 static const jl_kf_form *const par_forms[] = { &jl_kf_joseph, &jl_kf_standard,
@@ -42,8 +42,8 @@ struct par_bank {
     jl_real scratch[JL_IMM_SCRATCH(PAR_MOST, PAR_N, PAR_Z)];
     jl_real Pi[PAR_MOST * PAR_MOST];
     jl_motion motions[PAR_MOST];
-    const int *map[PAR_MOST];
     jl_nonlinear nonlinear[PAR_MOST];
+    const int *map[PAR_MOST];
     jl_imm imm;
     jl_chan *silent;            /* nothing ever comes here                  */
     int hangs_at;               /* or -1                                    */
@@ -157,8 +157,8 @@ static inline void par_bank_gate(struct par_bank *bank, int sticky)
 
 /* --- nonlinear modes ------------------------------------------------------ */
 
-/* The faster, the more the velocity turns; context is the mode's motion.  Where
- * the measurements that are absurd have led there is no sine, but a code. */
+/* The faster, the more the velocity turns; context is the mode's motion.
+ * Where the measurements that are absurd have led is no sine, but a code. */
 static inline int par_f(jl_real *y, const jl_real *x, void *context)
 {
     const jl_motion *motion = context;
@@ -213,7 +213,7 @@ static inline void par_bank_bend(struct par_bank *bank)
     }
 }
 
-/* --- running it ------------------------------------------------------------ */
+/* --- running it ----------------------------------------------------------- */
 
 /* A model that changes now and then, in a prepare that spoils the scratch. */
 static inline int par_prepare(void *context, jl_imm *imm, const jl_meas *meas)
@@ -296,13 +296,13 @@ static inline void par_serial(struct par_trace *trace,
 
     memset(trace, 0, sizeof *trace);
     par_bank_init(&bank, shape->M, shape->sticky, shape->form);
+    if (shape->nonlinear)
+        par_bank_bend(&bank);
     bank.hangs_at = -1;
     if (shape->sizes)
         par_bank_sizes(&bank);
     if (shape->gate)
         par_bank_gate(&bank, shape->sticky);
-    if (shape->nonlinear)
-        par_bank_bend(&bank);
     for (k = 0; k < PAR_STEPS; k++) {
         par_meas(&meas, z, k);
         if (shape->gate)

@@ -1,7 +1,7 @@
 /* A radar that measures range and bearing follows an aircraft that flies
- * straight, turns about at 3 degrees a second, and flies straight again.  An IMM
- * of a straight flight and a turn of unknown rate, once with extended Kalman
- * filters and once with unscented ones:
+ * straight, turns about at 3 degrees a second, and flies straight again.  An
+ * IMM of a straight flight and a turn of unknown rate, once with extended
+ * Kalman filters and once with unscented ones:
  *
  *     cc -Iinclude tests/examples/radar.c build/libjumplink.a -lm && ./a.out
  */

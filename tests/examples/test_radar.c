@@ -1,6 +1,7 @@
 /* The example radar.c, as it is, against an IMM written apart from the library:
- * long double, full covariances, Jacobians by hand, sigma points from a Cholesky
- * factor; and whether its filters are as good as they say, over many runs. */
+ * long double, full covariances, Jacobians by hand, sigma points from a
+ * Cholesky factor; and whether its filters are as good as they say, over many
+ * runs. */
 #include "close.h"
 
 #include <stdint.h>
@@ -605,8 +606,8 @@ static void uncertainty(double *nis_off, double *nees_off, int f,
     *nees_off = off_chi_square(end, 5.0 * RUNS);
 }
 
-/* With a third of the example's noise every form is within 99.9% of what it says
- * of itself. */
+/* With a third of the example's noise every form is within 99.9% of what it
+ * says of itself. */
 static void test_radar_turns_are_as_uncertain_as_said(void **state)
 {
     double nis, end;

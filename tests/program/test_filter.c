@@ -915,14 +915,16 @@ static void test_help_names_every_option(void **state)
     } helps[] = {
         { NULL, "sim filter host pe --help --version" },
         { "sim", "--data --model --out -o --pes --port --filter --mode --form "
-                 "--hold --z --time --timeout --lcm-url --run --input --idle" },
+                 "--gate --gate-most --hold --z --time --timeout --lcm-url "
+                 "--run --input --idle" },
         { "filter", "MODEL.json DATA.csv --out -o --filter --mode --form "
-                    "--hold --z --time --port --pes --timeout --lcm-url "
-                    "--run" },
-        { "host", "MODEL.json DATA.csv --out -o --filter --mode --form --hold "
-                  "--z --time --pes --run --timeout --start --lcm-url" },
+                    "--gate --gate-most --diagnostics --truth --hold --z "
+                    "--time --port --pes --timeout --lcm-url --run" },
+        { "host", "MODEL.json DATA.csv --out -o --filter --mode --form "
+                  "--gate --gate-most --hold --z --time --pes --run --timeout "
+                  "--start --lcm-url" },
         { "pe", "--pe --pes --model --run --timeout --start --lcm-url "
-                "--filter --mode --form" },
+                "--filter --mode --form --gate --gate-most" },
     };
     size_t i;
 

@@ -284,7 +284,7 @@ static void test_unscented_beats_jacobian_after_update(void **state)
     rig.mode.R[3] = rig.mode.V[3] = JL_C(0.25);
     update(&rig, z);
     off_ekf = fabs((double)rig.kf.x[0] - mean);
-    assert_true(off_ekf > 1.5 * sqrt((double)rig.P[0]));  /* and is sure of it */
+    assert_true(off_ekf > 1.5 * sqrt((double)rig.P[0])); /* and sure */
     make(&rig, &jl_kf_unscented, 2, 2, x, P, 0, 4, &radar);
     rig.mode.R[3] = rig.mode.V[3] = JL_C(0.25);
     update(&rig, z);
@@ -454,8 +454,8 @@ static int squares_2(jl_real *y, const jl_real *x, void *context)
 
 static const jl_nonlinear both = { squares_2, NULL, NULL, NULL, NULL, NULL, 0 };
 
-/* (x_0, x_1) = (3, 5) + e (1, 2), e ~ N(0, 1/2): y_0 = (3 + e)^2 has the mean of
- * one variable, while the other pair of points lies on the centre, with its
+/* (x_0, x_1) = (3, 5) + e (1, 2), e ~ N(0, 1/2): y_0 = (3 + e)^2 has the mean
+ * of one variable, while the other pair of points lies on the centre, with its
  * weights: of the fourth moment the points have (2 + kappa) s^4. */
 static void test_unscented_rank_one(void **state)
 {
