@@ -239,7 +239,7 @@ static void check_agree(const jl_nonlinear *given, double tolerance)
 static void test_sqrt_linearises_as_joseph(void **state)
 {
     jl_nonlinear pendulum = { swings, swing_slope, looks, look_slope, NULL,
-                              NULL };
+                              NULL, 0 };
 
     (void)state;
     check_agree(&pendulum, 2.0e4 * EPS);
