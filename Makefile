@@ -86,6 +86,10 @@ $(BUILD)/obj/%.o: %.c $(BUILD)/flags
 $(BUILD)/obj_f32/%.o: %.c $(BUILD)/flags
 	$(call compile,$(HOST) $(FLOAT))
 
+# Fixed sizes gain by unrolling; in sections, since each program wants its own.
+SIZES := %/src/kf/kf_sizes.o
+$(SIZES): private CFLAGS += -O3 -ffunction-sections -fdata-sections
+
 # Two notes that change only when what they say changes, so that other flags
 # or a source that is gone also rebuild what they concern.
 $(BUILD)/flags: NOTE = $(CC) $(CORE) $(HOST) $(CFLAGS)
@@ -134,7 +138,7 @@ check: deps
 # tests/<folder>/test_x.c becomes $(BUILD)/tests/test_x and
 # $(BUILD)/tests_f32/test_x; other .c files help the tests of their folder.
 # A test knows the checkout (TOP_DIR) and its program (JUMPLINK) by macros.
-TEST_FOLDERS := unit golden conform fault program fuzz
+TEST_FOLDERS := unit golden conform fault program fuzz examples
 TESTING = $(HOST) -Isrc -Itests -I$(BUILD)/golden -DTOP_DIR='"$(CURDIR)"' \
     -DJUMPLINK='"$(abspath $(BUILD)/jumplink$(1))"'
 
@@ -142,7 +146,7 @@ HELP_FROM_fault := tests/conform/conform.c
 
 define tests_of # folder, suffix
 HELP_$(1)$(2) := $$(patsubst %.c,$(BUILD)/obj$(2)/%.o,$$(filter-out \
-    tests/$(1)/test_% tests/$(1)/gen_%,$$(wildcard tests/$(1)/*.c) $(HELP_FROM_$(1))))
+    tests/$(1)/test_% tests/$(1)/gen_% tests/examples/%,$$(wildcard tests/$(1)/*.c) $(HELP_FROM_$(1))))
 TESTS_$(1)$(2) := $$(patsubst tests/$(1)/%.c,$(BUILD)/tests$(2)/%,$$(wildcard \
     tests/$(1)/test_*.c))
 TESTS += $$(TESTS_$(1)$(2))
@@ -168,7 +172,7 @@ $(BUILD)/gen_golden: tests/golden/gen_golden.c $(BUILD)/flags
 
 run-tests: $(TESTS) $(PROGRAMS) lib
 	@CC='$(CC)' CFLAGS='$(CFLAGS)' BUILD='$(BUILD)' sh tests/check/run_tests.sh \
-	    $(sort $(TESTS)) tests/check/test_mixing.sh tests/check/test_readme.sh
+	    $(sort $(TESTS)) tests/check/test_mixing.sh tests/check/test_readme.sh tests/check/test_examples.sh
 
 # No fork: what ThreadSanitizer watches are threads.
 run-tsan: $(foreach t,conform_loop conform_threads par_loop par_threads fault_threads,$(BUILD)/tests/test_$(t) $(BUILD)/tests_f32/test_$(t))
@@ -212,11 +216,29 @@ $(BENCHES): $(BUILD)/bench/%: $(BUILD)/obj/tests/bench/%.o \
     $(BUILD)/libsim.a $(BUILD)/libports.a $(BUILD)/libjumplink.a
 	@mkdir -p $(@D); echo '  $@'; $(CC) $(CFLAGS) -pthread $^ $(LIBS) -o $@
 
+# Steps of fixed sizes beside Eigen: everybody's filters compiled for this
+# machine, the others' also with fused multiply-adds, which the library does
+# without for the sake of its bits.
+NATIVE := -O3 -march=native
+$(BUILD)/native/libjumplink.a: $(CORE_SRC:%.c=$(BUILD)/native/%.o)
+$(BUILD)/native/%: private CFLAGS += $(NATIVE)
+$(BUILD)/native/src/%.o: src/%.c $(BUILD)/flags
+	$(call compile,$(CORE))
+$(BUILD)/native/%.o: %.c $(BUILD)/flags
+	$(call compile,$(HOST) -ffp-contract=fast)
+$(BUILD)/native/%.o: %.cc $(BUILD)/flags
+	@mkdir -p $(@D); echo '  $@'; \
+	    $(CXX) -std=c++17 -Wall -Wextra -Iinclude -DNDEBUG -fno-math-errno $(CFLAGS) -MMD -MP -c $< -o $@
+$(BUILD)/bench/bench_sizes: $(patsubst %,$(BUILD)/native/tests/bench/%.o,bench_sizes sizes_jumplink sizes_plain sizes_eigen) \
+    $(BUILD)/obj/tests/bench/bench_samples.o $(BUILD)/libsim.a $(BUILD)/native/libjumplink.a
+	@mkdir -p $(@D); echo '  $@'; $(CXX) $(CFLAGS) -pthread $^ $(LIBS) -o $@
+
 bench: deps
+	@CC='$(CC)' sh tests/check/deps.sh bench
 	$(AGAIN) run-bench
 
-run-bench: $(BENCHES)
-	@for b in $(BENCHES); do $$b $(BUILD)/bench || exit 1; done
+run-bench: $(BENCHES) $(BUILD)/bench/bench_sizes
+	@for b in $^; do $$b $(BUILD)/bench || exit 1; done
 	@cd $(BUILD)/bench && gnuplot '$(CURDIR)/tests/bench/latency.gp' '$(CURDIR)/tests/bench/break_even.gp'
 	@echo 'CSV and plots: $(BUILD)/bench'
 
@@ -226,7 +248,7 @@ install: all
 	mkdir -p $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include/jumplink $(DESTDIR)$(PREFIX)/bin
 	cp $(BUILD)/libjumplink.a $(BUILD)/libjumplink_f32.a $(DESTDIR)$(PREFIX)/lib/
 	cp include/jumplink.h $(DESTDIR)$(PREFIX)/include/
-	cp include/jumplink/*.h $(DESTDIR)$(PREFIX)/include/jumplink/
+	cp include/jumplink/*.h include/jumplink/*.def $(DESTDIR)$(PREFIX)/include/jumplink/
 	$(if $(PROGRAMS),cp $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin/)
 
 clean:

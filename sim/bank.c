@@ -12,7 +12,8 @@ static int copy_modes(struct bank *bank)
     size_t need = 0;
 
     for (j = 0; j < model->M; j++)
-        need += (size_t)JL_MODE_MEM(model->n, model->m, model->modes[j].p);
+        need += (size_t)JL_MODE_MEM(model->modes[j].n, model->m,
+                                    model->modes[j].p);
     bank->modes = calloc((size_t)model->M, sizeof *bank->modes);
     bank->mode_mem = calloc(need, sizeof *mem);
     if (bank->modes == NULL || bank->mode_mem == NULL)
@@ -31,9 +32,10 @@ static int copy_modes(struct bank *bank)
     return 0;
 }
 
-static int open_imm(struct bank *bank, const jl_kf_form *form)
+static int open_imm(struct bank *bank, const struct options *options)
 {
-    int M = bank->model->M, n = bank->model->n, m = bank->model->m;
+    const struct model *model = bank->model;
+    int M = model->M, n = model->n, m = model->m;
     size_t size = sizeof(jl_real);
 
     bank->mem = calloc((size_t)JL_IMM_STATE(M, n, m), size);
@@ -44,19 +46,23 @@ static int open_imm(struct bank *bank, const jl_kf_form *form)
     if (bank->mem == NULL || bank->scratch == NULL || bank->Pi == NULL
         || bank->x == NULL || bank->P == NULL)
         return -1;
-    return jl_imm_init(&bank->imm, M, bank->modes, form, JL_MIX_AUTO,
-                       bank->mem, JL_IMM_STATE(M, n, m)) == JL_OK ? 0 : -1;
+    return jl_imm_init_sizes(&bank->imm, M, n, bank->modes, model->map,
+                             model->prior_x, model->prior_var, options->form,
+                             JL_MIX_AUTO, bank->mem, JL_IMM_STATE(M, n, m))
+            == JL_OK
+        && jl_imm_gate(&bank->imm, options_gate(options, m),
+                       options->gate_most) == JL_OK ? 0 : -1;
 }
 
 int bank_open(struct bank *bank, const struct model *model,
-              const jl_kf_form *form)
+              const struct options *options)
 {
     memset(bank, 0, sizeof *bank);
     bank->model = model;
     bank->dt = -1;
     if (model->M < 1)
         return -1;
-    if (copy_modes(bank) != 0 || open_imm(bank, form) != 0) {
+    if (copy_modes(bank) != 0 || open_imm(bank, options) != 0) {
         bank_close(bank);
         return -1;
     }
@@ -75,7 +81,8 @@ void bank_close(struct bank *bank)
     memset(bank, 0, sizeof *bank);
 }
 
-/* Every mode starts from the same first measurement. */
+/* Every mode starts from the same first measurement; one that lacks the
+ * acceleration as if it had it: then that is the prior. */
 static int start_from(struct bank *bank, jl_imm *imm, const jl_real *z)
 {
     const struct model *model = bank->model;
@@ -84,9 +91,11 @@ static int start_from(struct bank *bank, jl_imm *imm, const jl_real *z)
     if (z == NULL)
         return JL_EORDER;               /* the feed does not let that happen */
     for (j = 0; j < model->M; j++) {
-        status = jl_motion_start(bank->x + j * n, bank->P + j * n * n,
-                                 &model->motions[j], z, model->v0_std,
-                                 model->a0_std);
+        jl_motion motion = model->motions[j];
+
+        motion.order = n / model->m;
+        status = jl_motion_start(bank->x + j * n, bank->P + j * n * n, &motion,
+                                 z, model->v0_std, model->a0_std);
         if (status != JL_OK)
             return status;
     }

@@ -5,6 +5,7 @@
 #include "jumplink/imm.h"
 #include "jumplink/par.h"
 #include "model_file.h"
+#include "options.h"
 
 struct bank {
     const struct model *model;
@@ -18,7 +19,7 @@ struct bank {
 
 /* Returns 0, or -1 if there is no memory. */
 int bank_open(struct bank *bank, const struct model *model,
-              const jl_kf_form *form);
+              const struct options *options);
 void bank_close(struct bank *bank);
 
 /* A jl_prepare with a struct bank as context: starts a record, rebuilds the

@@ -11,7 +11,12 @@ static const char help[] =
     "Runs a filter over the measurements in a file and writes its\n"
     "estimates as CSV: time, x0.., P00,P01.. (upper triangle), mu0..,\n"
     "loglik.\n\n"
+    MODEL_HELP
     "  -o, --out FILE    where to (default: standard output)\n"
+    "  --diagnostics     more columns: of each mode j its innovation nu<j>_0..,\n"
+    "                    nis<j> = nu' S^-1 nu, nis_mean<j>; rejected (0, 1)\n"
+    "  --truth A,-,B,..  ... and nees = e' P^-1 e, for data whose columns A,\n"
+    "                    B,.. are the true state, in its order; -: unknown\n"
     COMMON_HELP
     DATA_HELP
     "  --pes P           run on this many PEs (default 4 with --port, else\n"
@@ -24,14 +29,45 @@ static const char help[] =
     "                    and JL.NAME.measurement (default jumplink)\n"
     HELP_HELP;
 
+/* Only the serial filter has all of it in one place. */
+static int check_diagnostics(const struct options *options)
+{
+    if (options->truth != NULL && !options->diagnostics)
+        return misuse("filter", "--truth goes with --diagnostics");
+    if (options->diagnostics && options->port != PORT_NONE)
+        return misuse("filter", "--diagnostics: in a parallel run PE0 knows "
+                      "only its own modes; the serial run, without --pes and "
+                      "--port, has the same bits");
+    return 0;
+}
+
 int cmd_filter(int argc, char **argv)
 {
+    static const struct option known[] = {
+        { "diagnostics", no_argument, NULL, 'd' },
+        { "truth", required_argument, NULL, 't' },
+        COMMON_OPTIONS, { 0 }
+    };
     struct options options;
-    int status;
+    int c, status = 0;
 
     options_init(&options, "filter");
-    status = options_parse(&options, argc, argv, help);
-    if (status >= 0)
+    while ((c = getopt_long(argc, argv, SHORT_OPTIONS, known, NULL)) != -1) {
+        if (c == 'h') {
+            fputs(help, stdout);
+            return 0;
+        }
+        if (c == 'd')
+            options.diagnostics = 1;
+        else if (c == 't')
+            options.truth = optarg;
+        else
+            status = options_take(&options, c, argv);
+        if (status != 0)
+            return status;
+    }
+    status = options_end(&options);
+    if (status != 0)
         return status;
     if (argc - optind != 2)
         return misuse("filter", "needs MODEL.json and DATA.csv");
@@ -46,6 +82,9 @@ int cmd_filter(int argc, char **argv)
                                              != JL_EXCHANGE_GATHER))
         return misuse("filter", "--topology and --exchange need --pes or "
                       "--port");
+    status = check_diagnostics(&options);
+    if (status != 0)
+        return status;
     if (options.pes == 0)
         options.pes = 4;
     return run_file(argv[optind], argv[optind + 1], &options);

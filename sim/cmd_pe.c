@@ -74,6 +74,9 @@ int cmd_pe(int argc, char **argv)
         if (status != 0)
             return status;
     }
+    status = options_end(&options);
+    if (status != 0)
+        return status;
     if (optind < argc)
         return misuse("pe", "unexpected '%s'", argv[optind]);
     if (pe < 0 || options.pes == 0 || path == NULL || options.lcm_url == NULL)

@@ -250,6 +250,9 @@ int cmd_sim(int argc, char **argv)
         if (status != 0)
             return status;
     }
+    status = options_end(&options);
+    if (status != 0)
+        return status;
     if (optind < argc)
         return misuse("sim", "unexpected '%s'", argv[optind]);
     if (options.start_us == 0)

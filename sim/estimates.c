@@ -7,6 +7,8 @@
 #include <unistd.h>
 
 #include "complain.h"
+#include "diagnostics.h"
+#include "jumplink/kf.h"
 #include "out_file.h"
 
 /* From count to more numbers, the new ones NaN.  All NaNs have the same bits,
@@ -85,6 +87,12 @@ void estimates_note(struct estimates *e, long row, const jl_real *x,
     e->loglik[row] = loglik;
     e->us[row] = us;
     e->done = row + 1;
+}
+
+void estimates_judge(struct estimates *e, int verdict)
+{
+    e->judged += verdict != JL_MISSING;
+    e->rejected += verdict == JL_REJECTED;
 }
 
 static int same(const jl_real *a, const jl_real *b, long count)
@@ -171,7 +179,10 @@ void estimates_write(const struct estimates *e, const struct data_file *data,
             fprintf(out, n > 10 ? ",P%d_%d" : ",P%d%d", a, b);
     for (a = 0; a < e->M; a++)
         fprintf(out, ",mu%d", a);
-    fputs(",loglik\n", out);
+    fputs(",loglik", out);
+    if (e->diagnostics != NULL)
+        diagnostics_write_names(e->diagnostics, out);
+    fputc('\n', out);
     for (row = 0; row < rows; row++) {
         if (data->run != NULL)
             fprintf(out, "%ld,", data->run[row]);
@@ -184,6 +195,8 @@ void estimates_write(const struct estimates *e, const struct data_file *data,
         for (a = 0; a < e->M; a++)
             put(out, e->mu[row * e->M + a]);
         put(out, e->loglik[row]);
+        if (e->diagnostics != NULL)
+            diagnostics_write(e->diagnostics, row, out);
         fputc('\n', out);
     }
     if (partial)

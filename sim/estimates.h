@@ -7,14 +7,18 @@
 #include "data_file.h"
 #include "model_file.h"
 
+struct diagnostics;
+
 struct estimates {
     long rows, room;            /* of rows there is memory for `room`       */
     long done;                  /* behind the last with an estimate         */
+    long judged, rejected;      /* measurements, and those the gate rejected */
     int n, M;
     jl_real *x;                 /* [rows,n]; NaN in rows without estimate   */
     jl_real *P;                 /* [rows,n,n]                               */
     jl_real *mu;                /* [rows,M]                                 */
     jl_real *loglik;            /* [rows]                                   */
+    struct diagnostics *diagnostics;    /* more columns; or NULL            */
     double *us;                 /* [rows] wall clock of the step; NaN in a
                                    row without one (the start is none)      */
 };
@@ -32,6 +36,9 @@ void estimates_note(struct estimates *e, long row, const jl_real *x,
                     const jl_real *P, const jl_real *mu, jl_real loglik,
                     double us);
 
+/* Count a measurement by its verdict (kf.h). */
+void estimates_judge(struct estimates *e, int verdict);
+
 /* 1 if all numbers of both have the same bits (times apart). */
 int estimates_same(const struct estimates *a, const struct estimates *b);
 
@@ -43,8 +50,8 @@ double estimates_apart(const struct estimates *a, const struct estimates *b);
 long estimates_times(const struct estimates *e, double *median_us,
                      double *p99_us);
 
-/* As CSV: time (and run), x, P upper triangle, mu, loglik; all rows, or, when
- * `partial`, those that were done and a last line that says so. */
+/* As CSV: time (and run), x, P upper triangle, mu, loglik, and diagnostics if
+ * there are; all rows, or, when `partial`, those that were done and a last line that says so. */
 void estimates_write(const struct estimates *e, const struct data_file *data,
                      int partial, FILE *out);
 

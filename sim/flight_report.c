@@ -71,13 +71,13 @@ void flight_run_name(struct flight_run *run, const struct model *model,
 static double velocity_error(const struct flight_run *run,
                              const struct data_file *data, long row)
 {
-    int n = run->e.n, order = run->source->motions[0].order;
+    int n = run->e.n, north = n / 2;
     const jl_real *x = run->e.x + row * n;
     const double *truth = data->extra + row * data->n_extra;
 
     if (isnan(run->e.us[row]))
         return (double)NAN;
-    return hypot((double)x[1] - truth[0], (double)x[order + 1] - truth[1]);
+    return hypot((double)x[1] - truth[0], (double)x[north + 1] - truth[1]);
 }
 
 static double rms_error(const struct flight_run *run,
@@ -148,13 +148,13 @@ static int write_track(const struct flight_report *r, const char *folder)
 
 /* --- table --------------------------------------------------------------- */
 
-#define HEAD "%-12s %-10s %8s %6s %8s %8s %7s %8s %6s %s\n"
+#define HEAD "%-12s %-10s %8s %6s %8s %8s %7s %8s %6s %s%s\n"
 
 static void print_table(const struct flight_report *r, FILE *out)
 {
     int i;
 
-    fprintf(out, "%s: %ld rows, %d PEs over %s, %s%s, %s, %s\n",
+    fprintf(out, "%s: %ld rows, %d PEs over %s, %s%s, %s, %s",
             r->data->path, r->data->rows, r->options->pes,
             r->options->port == PORT_LCM ? "LCM"
                 : options_port_name(r->options->port),
@@ -162,22 +162,29 @@ static void print_table(const struct flight_report *r, FILE *out)
             r->options->exchange == JL_EXCHANGE_REDUCE ? ", all-reduce" : "",
             options_form(r->options),
             JL_REAL_FLOAT ? "float" : "double");
+    if (r->options->gate > 0)
+        fprintf(out, ", gate %.17g", r->options->gate);
+    fputc('\n', out);
     fprintf(out, HEAD, "", "held", "velocity", "", "step, us", "", "serial",
-            "messages", "", "same bits");
+            "messages", "", r->options->gate > 0 ? "by gate  " : "",
+            "same bits");
     fprintf(out, HEAD, "model", "positions", "rms, m/s", "steps", "median",
-            "p99", "median", "sent", "resent", "as serial");
+            "p99", "median", "sent", "resent",
+            r->options->gate > 0 ? "rejected " : "", "as serial");
     for (i = 0; i < r->count; i++) {
         const struct flight_run *run = &r->runs[i];
         double median, p99;
         long steps = estimates_times(&run->e, &median, &p99);
-        char same[40];
+        char same[40], rejected[32] = "";
 
+        if (r->options->gate > 0)
+            snprintf(rejected, sizeof rejected, "%8ld ", run->e.rejected);
         snprintf(same, sizeof same, run->same ? "yes" : "NO, %.1e sigma",
                  run->apart);
         fprintf(out, "%-12s %-10s %8.2f %6ld %8.1f %8.1f %7.1f %8lu %6lu "
-                "%s\n", run->model, run->positions, rms_error(run, r->data),
-                steps, median, p99, run->serial_us, run->traffic.messages,
-                run->traffic.resent,
+                "%s%s\n", run->model, run->positions,
+                rms_error(run, r->data), steps, median, p99, run->serial_us,
+                run->traffic.messages, run->traffic.resent, rejected,
                 run->partial ? "(partial)" : same);
     }
 }
@@ -188,17 +195,21 @@ static void print_csv(const struct flight_report *r, FILE *out)
 
     fputs("model,positions,velocity_rms_mps,steps,step_median_us,step_p99_us,"
           "serial_median_us,messages,octets,resent,same_bits,apart_sigma,"
-          "partial\n", out);
+          "partial", out);
+    fputs(r->options->gate > 0 ? ",rejected\n" : "\n", out);
     for (i = 0; i < r->count; i++) {
         const struct flight_run *run = &r->runs[i];
         double median, p99;
         long steps = estimates_times(&run->e, &median, &p99);
 
-        fprintf(out, "%s,%s,%.6g,%ld,%.6g,%.6g,%.6g,%lu,%lu,%lu,%d,%.3g,%d\n",
+        fprintf(out, "%s,%s,%.6g,%ld,%.6g,%.6g,%.6g,%lu,%lu,%lu,%d,%.3g,%d",
                 run->model, run->positions, rms_error(run, r->data), steps,
                 median, p99, run->serial_us, run->traffic.messages,
                 run->traffic.octets, run->traffic.resent, run->same, run->apart,
                 run->partial);
+        if (r->options->gate > 0)
+            fprintf(out, ",%ld", run->e.rejected);
+        fputc('\n', out);
     }
 }
 
@@ -233,7 +244,7 @@ static int plot_model(const struct flight_report *r, int first, int count,
     char file[WAYS][128], legend[WAYS][48], north[16], name[128], title[128];
     int i, status;
 
-    snprintf(north, sizeof north, "x%d", runs->source->motions[0].order);
+    snprintf(north, sizeof north, "x%d", runs->e.n / 2);
     track[0] = (struct plot_series){ "track.csv", "east_m", "north_m",
                                      "measured", PLOT_DOTS };
     error[0] = (struct plot_series){ "track.csv", time, "held",
@@ -272,6 +283,9 @@ static int plot_run_modes(const struct flight_report *r,
         if (motion->kind == JL_MOTION_CT)
             snprintf(label[j], sizeof label[j], "CT %+g rad/s",
                      (double)motion->turn_rate);
+        else if (motion->kind == JL_MOTION_SINGER)
+            snprintf(label[j], sizeof label[j], "Singer %g m/s^2, %g s",
+                     (double)motion->accel_std, (double)motion->tau_s);
         else
             snprintf(label[j], sizeof label[j], "%s %g m/s^2",
                      motion->kind == JL_MOTION_CV ? "CV" : "CA",

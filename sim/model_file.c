@@ -170,13 +170,27 @@ static int has_start(const struct json_at *at)
     return x0;
 }
 
-static int take_start(struct model *model, const struct json_at *at, int mode)
+/* Of k components: all n at the top, in a mode those that it has. */
+static int take_start(struct model *model, const struct json_at *at, int mode,
+                      int k)
 {
-    int n = model->n;
+    int n = model->n, i, j, error;
+    jl_real *x = reals(k, k + 1, 1), *P = x + k;
+    const int *map = k < n ? model->map[mode] : NULL;
 
-    if (json_take_vector(model->x0 + mode * n, at, "x0", n, JL_LARGE) != 0)
-        return -1;
-    return take_cov(model->P0 + mode * n * n, at, "P0", n, 0);
+    if (x == NULL)
+        return no_memory(at);
+    error = json_take_vector(x, at, "x0", k, JL_LARGE) != 0
+        || take_cov(P, at, "P0", k, 0) != 0;
+    for (i = 0; i < k && !error; i++) {
+        int row = mode * n + (map != NULL ? map[i] : i);
+
+        model->x0[row] = x[i];
+        for (j = 0; j < k; j++)
+            model->P0[row * n + (map != NULL ? map[j] : j)] = P[i * k + j];
+    }
+    free(x);
+    return error ? -1 : 0;
 }
 
 /* x0, P0 in every mode, or once at the top, or nowhere. */
@@ -217,7 +231,8 @@ static int take_starts(struct model *model, const struct json_at *top)
     for (i = 0; i < M; i++) {
         if (!at_top && json_entry(&mode, top, "modes", i) != 0)
             return -1;
-        if (take_start(model, at_top ? top : &mode, i) != 0)
+        if (take_start(model, at_top ? top : &mode, i,
+                       at_top ? n : model->modes[i].n) != 0)
             return -1;
     }
     return 0;
@@ -225,23 +240,24 @@ static int take_starts(struct model *model, const struct json_at *top)
 
 /* --- modes by matrices ------------------------------------------------- */
 
-/* The modes and their memory in one block: mode i has p[i] noises. */
+/* The modes and their memory in one block: mode i has n[i] states and p[i]
+ * noises. */
 static int make_modes(struct model *model, const struct json_at *top,
-                      const int *p)
+                      const int *n, const int *p)
 {
-    int i, n = model->n, m = model->m, M = model->M;
+    int i, m = model->m, M = model->M;
     size_t octets = (size_t)M * sizeof(jl_mode);
     jl_real *mem;
 
     for (i = 0; i < M; i++)
-        octets += (size_t)JL_MODE_MEM(n, m, p[i]) * sizeof(jl_real);
+        octets += (size_t)JL_MODE_MEM(n[i], m, p[i]) * sizeof(jl_real);
     model->modes = malloc(octets);
     if (model->modes == NULL)
         return no_memory(top);
     mem = (jl_real *)(void *)(model->modes + M);
     for (i = 0; i < M; i++) {
-        int cap = JL_MODE_MEM(n, m, p[i]);
-        int status = jl_mode_init(&model->modes[i], n, m, p[i], mem, cap);
+        int cap = JL_MODE_MEM(n[i], m, p[i]);
+        int status = jl_mode_init(&model->modes[i], n[i], m, p[i], mem, cap);
 
         if (status != JL_OK)
             return json_wrong(top, "modes", "%s", jl_status_text(status));
@@ -302,19 +318,21 @@ static int read_matrices(struct model *model, const struct json_at *top)
         NULL
     };
     struct json_at mode;
-    int p[JL_MAX_MODES];
+    int n[JL_MAX_MODES], p[JL_MAX_MODES];
     int i;
 
     if (json_only(top, top_keys) != 0
         || json_take_count(&model->n, top, "n", 1, JL_MAX_STATES) != 0
         || json_take_count(&model->m, top, "m", 1, JL_MAX_STATES) != 0)
         return -1;
-    for (i = 0; i < model->M; i++)
+    for (i = 0; i < model->M; i++) {
+        n[i] = model->n;
         if (json_entry(&mode, top, "modes", i) != 0
             || json_only(&mode, mode_keys) != 0
             || count_noises(&p[i], &mode, model->n) != 0)
             return -1;
-    if (make_modes(model, top, p) != 0)
+    }
+    if (make_modes(model, top, n, p) != 0)
         return -1;
     for (i = 0; i < model->M; i++)
         if (json_entry(&mode, top, "modes", i) != 0
@@ -324,6 +342,20 @@ static int read_matrices(struct model *model, const struct json_at *top)
 }
 
 /* --- modes of the catalogue -------------------------------------------- */
+
+/* A number above 0; `usual` when it may be left out, else 0. */
+static int take_above_0(jl_real *value, const struct json_at *at,
+                        const char *key, jl_real usual)
+{
+    *value = usual;
+    if (usual > 0 && !json_has(at, key))
+        return 0;
+    if (json_take_real(value, at, key) != 0)
+        return -1;
+    if (!(*value > 0))
+        return json_wrong(at, key, "%.9g: must be above 0", (double)*value);
+    return 0;
+}
 
 static int take_type(int *kind, const struct json_at *mode, int axes,
                      int order)
@@ -339,29 +371,48 @@ static int take_type(int *kind, const struct json_at *mode, int axes,
     else if (strcmp(type, "ct") == 0)
         *kind = JL_MOTION_CT;
     else if (strcmp(type, "singer") == 0)
-        return json_wrong(mode, "type",
-                          "'singer' is not supported by this version");
+        *kind = JL_MOTION_SINGER;
     else
-        return json_wrong(mode, "type", "'%.40s' is not cv, ca or ct", type);
-    if (*kind == JL_MOTION_CA && order != 3)
-        return json_wrong(mode, "type", "ca needs order 3");
+        return json_wrong(mode, "type", "'%.40s' is not cv, ca, ct or singer",
+                          type);
+    if ((*kind == JL_MOTION_CA || *kind == JL_MOTION_SINGER) && order != 3)
+        return json_wrong(mode, "type", "%s needs order 3", type);
     if (*kind == JL_MOTION_CT && axes != 2)
         return json_wrong(mode, "type", "ct needs axes 2");
     return 0;
 }
 
+/* The mode's order, if it is not the model's. */
+static int take_order(int *order, const struct json_at *mode)
+{
+    int most = *order;
+
+    if (!json_has(mode, "order"))
+        return 0;
+    if (json_take_count(order, mode, "order", 2, 3) != 0)
+        return -1;
+    return *order <= most ? 0
+        : json_wrong(mode, "order", "3, but at the top it is %d", most);
+}
+
 static int take_motion(jl_motion *motion, const struct json_at *mode)
 {
     static const char *const keys[] = {
-        "type", "accel_std", "x0", "P0", NULL
+        "type", "order", "accel_std", "x0", "P0", NULL
     };
     static const char *const keys_ct[] = {
-        "type", "accel_std", "turn_rate", "x0", "P0", NULL
+        "type", "order", "accel_std", "turn_rate", "x0", "P0", NULL
+    };
+    static const char *const keys_singer[] = {
+        "type", "order", "accel_std", "tau_s", "x0", "P0", NULL
     };
 
+    if (take_order(&motion->order, mode) != 0)
+        return -1;
     if (take_type(&motion->kind, mode, motion->axes, motion->order) != 0)
         return -1;
-    if (json_only(mode, motion->kind == JL_MOTION_CT ? keys_ct : keys) != 0
+    if (json_only(mode, motion->kind == JL_MOTION_CT ? keys_ct
+                  : motion->kind == JL_MOTION_SINGER ? keys_singer : keys) != 0
         || json_take_real(&motion->accel_std, mode, "accel_std") != 0)
         return -1;
     if (motion->accel_std < 0)
@@ -369,20 +420,8 @@ static int take_motion(jl_motion *motion, const struct json_at *mode)
                           "not negative", (double)motion->accel_std);
     if (motion->kind == JL_MOTION_CT)
         return json_take_real(&motion->turn_rate, mode, "turn_rate");
-    return 0;
-}
-
-/* A standard deviation above 0; `usual` when it may be left out, else 0. */
-static int take_std(jl_real *value, const struct json_at *top,
-                    const char *key, jl_real usual)
-{
-    *value = usual;
-    if (usual > 0 && !json_has(top, key))
-        return 0;
-    if (json_take_real(value, top, key) != 0)
-        return -1;
-    if (!(*value > 0))
-        return json_wrong(top, key, "%.9g: must be above 0", (double)*value);
+    if (motion->kind == JL_MOTION_SINGER)
+        return take_above_0(&motion->tau_s, mode, "tau_s", 0);
     return 0;
 }
 
@@ -407,27 +446,66 @@ static int try_motion(const struct model *model, const struct json_at *mode,
         : json_wrong(mode, NULL, "%s", jl_status_text(status));
 }
 
+/* Modes of order 2 beside some of order 3: they share a map, and what they lack
+ * is distributed like an acceleration at the start. */
+static int take_prior(struct model *model, const struct json_at *top,
+                      const jl_motion *common)
+{
+    int i, j, axes = common->axes, order = common->order, count = 0;
+    jl_real var = model->a0_std * model->a0_std;
+    int *two;
+
+    for (j = 0; j < model->M; j++)
+        count += model->motions[j].order < order;
+    if (count == 0)
+        return 0;
+    if (count == model->M)
+        return json_wrong(top, "order", "3, but every mode has order 2");
+    if (!(var > 0))
+        return json_wrong(top, "a0_std", "%.9g: its square is 0",
+                          (double)model->a0_std);
+    model->map = calloc(1, (size_t)model->M * sizeof *model->map
+                        + (size_t)(2 * axes) * sizeof *two);
+    model->prior_x = reals(model->n, 2, 1);
+    if (model->map == NULL || model->prior_x == NULL)
+        return no_memory(top);
+    two = (int *)(void *)(model->map + model->M);
+    for (i = 0; i < 2 * axes; i++)
+        two[i] = i / 2 * order + i % 2;
+    for (j = 0; j < model->M; j++)
+        if (model->motions[j].order < order)
+            model->map[j] = two;
+    model->prior_var = model->prior_x + model->n;
+    for (i = 0; i < model->n; i++)
+        model->prior_var[i] = var;
+    return 0;
+}
+
 static int take_motions(struct model *model, const struct json_at *top,
                         const jl_motion *common)
 {
     struct json_at mode;
-    int p[JL_MAX_MODES];
+    int n[JL_MAX_MODES], p[JL_MAX_MODES];
     int i;
 
     model->motions = calloc((size_t)model->M, sizeof *model->motions);
     if (model->motions == NULL)
         return no_memory(top);
-    for (i = 0; i < model->M; i++)
-        p[i] = common->axes;
-    if (make_modes(model, top, p) != 0)
-        return -1;
     for (i = 0; i < model->M; i++) {
         model->motions[i] = *common;
         if (json_entry(&mode, top, "modes", i) != 0
-            || take_motion(&model->motions[i], &mode) != 0
+            || take_motion(&model->motions[i], &mode) != 0)
+            return -1;
+        n[i] = common->axes * model->motions[i].order;
+        p[i] = jl_motion_noises(&model->motions[i]);
+    }
+    if (take_prior(model, top, common) != 0
+        || make_modes(model, top, n, p) != 0)
+        return -1;
+    for (i = 0; i < model->M; i++)
+        if (json_entry(&mode, top, "modes", i) != 0
             || try_motion(model, &mode, i) != 0)
             return -1;
-    }
     return 0;
 }
 
@@ -437,14 +515,14 @@ static int read_catalogue(struct model *model, const struct json_at *top)
         "kind", "axes", "order", "sigma_z", "v0_std", "a0_std",
         "sojourn_s", "Pi", "mu0", "modes", "x0", "P0", NULL
     };
-    jl_motion common = { 0, 0, 0, 0, 0, 0 };
+    jl_motion common = { 0, 0, 0, 0, 0, 0, 0 };
 
     if (json_only(top, keys) != 0
         || json_take_count(&common.axes, top, "axes", 1, JL_MAX_STATES / 3)
         || json_take_count(&common.order, top, "order", 2, 3) != 0
-        || take_std(&common.sigma_z, top, "sigma_z", 0) != 0
-        || take_std(&model->v0_std, top, "v0_std", 100) != 0
-        || take_std(&model->a0_std, top, "a0_std", 10) != 0)
+        || take_above_0(&common.sigma_z, top, "sigma_z", 0) != 0
+        || take_above_0(&model->v0_std, top, "v0_std", 100) != 0
+        || take_above_0(&model->a0_std, top, "a0_std", 10) != 0)
         return -1;
     model->n = common.axes * common.order;
     model->m = common.axes;
@@ -521,6 +599,8 @@ void model_free(struct model *model)
     free(model->path);
     free(model->modes);
     free(model->motions);
+    free(model->map);
+    free(model->prior_x);
     free(model->sojourn_s);
     free(model->Pi);
     free(model->mu0);

@@ -10,6 +10,9 @@ struct model {
     int M, n, m;
     jl_mode *modes;             /* [M]; of the catalogue: sized, not filled */
     jl_motion *motions;         /* [M] of the catalogue, or NULL: matrices  */
+    const int **map;            /* [M] what modes have of the n components
+                                   (jl_imm_init_sizes), or NULL: all        */
+    jl_real *prior_x, *prior_var;       /* [n] of what a mode lacks, or NULL */
     jl_real *sojourn_s;         /* [M] or NULL: Pi is fixed                 */
     jl_real *Pi;                /* [M,M] or NULL: from sojourn_s            */
     jl_real *mu0;               /* [M]                                      */

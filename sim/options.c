@@ -8,7 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "chi_square.h"
 #include "jumplink/config.h"
+#include "jumplink/par.h"
 
 int misuse(const char *command, const char *format, ...)
 {
@@ -59,6 +61,22 @@ int option_seconds(long *us, const char *command, const char *option,
                       option, value);
     *us = lrint(s * 1e6);
     return 0;
+}
+
+static int take_probability(double *p, const char *command,
+                            const char *option, const char *value)
+{
+    char *end;
+
+    *p = strtod(value, &end);
+    return end != value && *end == '\0' && *p > 0 && *p < 1 ? 0
+        : misuse(command, "--%s %s: must be a probability above 0 and below 1",
+                 option, value);
+}
+
+jl_real options_gate(const struct options *o, int m)
+{
+    return o->gate > 0 ? (jl_real)chi_square_quantile(o->gate, m) : 0;
 }
 
 static const char *const ports[] = { "loop", "threads", "lcm", NULL };
@@ -187,6 +205,13 @@ int options_take(struct options *o, int c, char *const *argv)
     case 1014:
         o->exchange = choose(o->command, "exchange", value, exchanges);
         return o->exchange < 0 ? 2 : 0;
+    case 1015:
+        return take_probability(&o->gate, o->command, "gate", value);
+    case 1016:
+        status = option_long(&number, o->command, "gate-most", value, 1,
+                             1000000000);
+        o->gate_most = (int)number;
+        return status;
     case 'o':
         return take_word(&o->out, o->command, "out", value);
     case ':':
@@ -196,6 +221,18 @@ int options_take(struct options *o, int c, char *const *argv)
             return misuse(o->command, "unknown option -%c", optopt);
         return misuse(o->command, "unknown option %s", argv[optind - 1]);
     }
+}
+
+int options_end(struct options *o)
+{
+    if (o->gate_most > 0 && !(o->gate > 0))
+        return misuse(o->command, "--gate-most goes with --gate");
+    if (o->gate > 0 && o->exchange == JL_EXCHANGE_REDUCE)
+        return misuse(o->command, "--gate needs --exchange gather: a PE's pool "
+                      "would depend on whether all others reject, too");
+    if (o->gate_most == 0)
+        o->gate_most = JL_GATE_MOST;
+    return 0;
 }
 
 int options_parse(struct options *o, int argc, char **argv, const char *help)
@@ -212,5 +249,6 @@ int options_parse(struct options *o, int argc, char **argv, const char *help)
         if (status != 0)
             return status;
     }
-    return -1;
+    status = options_end(o);
+    return status == 0 ? -1 : status;
 }

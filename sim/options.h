@@ -23,6 +23,9 @@ struct options {
     int kf;                     /* 0: imm, 1: kf of one mode                */
     int mode;                   /* ... this one; -1: the only one           */
     const jl_kf_form *form;
+    double gate;                /* a good measurement passes with this
+                                   probability; 0: no gate                  */
+    int gate_most;              /* rejections in a row; 0: not given        */
     enum hold hold;
     enum port port;             /* PORT_NONE: serial                        */
     int pes;
@@ -34,6 +37,8 @@ struct options {
     const char *run;            /* name of an LCM run, or NULL              */
     struct live_input *live;    /* rows come from there, one by one; or NULL */
     const char *z, *time;       /* columns of the data                      */
+    int diagnostics;            /* more columns of the estimates            */
+    const char *truth;          /* columns of the true state, "a,-,b"; NULL */
     const char *out;            /* -o or --out                              */
 };
 
@@ -54,6 +59,8 @@ struct options {
     { "start", required_argument, NULL, 1012 }, \
     { "topology", required_argument, NULL, 1013 }, \
     { "exchange", required_argument, NULL, 1014 }, \
+    { "gate", required_argument, NULL, 1015 }, \
+    { "gate-most", required_argument, NULL, 1016 }, \
     { "out", required_argument, NULL, 'o' }, \
     { "help", no_argument, NULL, 'h' }
 
@@ -61,7 +68,20 @@ struct options {
     "  --filter imm|kf   all modes (default), or the Kalman filter of one\n" \
     "  --mode J          ... of this one, from 0 (default: the only one)\n" \
     "  --form joseph|standard|sqrt  how covariances are kept and updated\n" \
-    "                    (default joseph; sqrt: as factors)\n"
+    "                    (default joseph; sqrt: as factors)\n" \
+    "  --gate P          reject outliers, which no mode expects: a good\n" \
+    "                    measurement passes with probability P (0.9999)\n" \
+    "  --gate-most N     ... until N were rejected in a row; then it is the\n" \
+    "                    filter that is wrong (default 5)\n"
+#define MODEL_HELP \
+    "The model is JSON.  Modes of the catalogue follow any time step; each\n" \
+    "has an accel_std and a type: cv; ca (order 3); ct (axes 2), with a\n" \
+    "turn_rate; singer (order 3), with a tau_s.  At the top: axes, order,\n" \
+    "sigma_z, and sojourn_s or Pi; and v0_std, a0_std of velocity (default\n" \
+    "100) and acceleration (10) before anything is known.  A mode may have\n" \
+    "order 2 beside others of order 3, the model's: to them its acceleration\n" \
+    "is 0 +- a0_std.  Or modes by matrices: Phi, Gamma, Q, H, R, and n, m,\n" \
+    "Pi, mu0 at the top.\n\n"
 #define DATA_HELP \
     "  --hold HOW        which measurements count as lost: none; detect:\n" \
     "                    those that repeat the row before exactly; column:\n" \
@@ -97,6 +117,9 @@ const char *options_port_name(enum port port);
 
 void options_init(struct options *options, const char *command);
 
+/* The nis above which a measurement of m components is rejected; 0: never. */
+jl_real options_gate(const struct options *options, int m);
+
 /* The topology's name. */
 const char *options_topology(const struct options *options);
 
@@ -111,6 +134,10 @@ const char *options_form(const struct options *options);
  * that getopt_long does not know is refused here.
  * Returns 0, or 2 (the exit status) after a message. */
 int options_take(struct options *options, int c, char *const *argv);
+
+/* When all are taken: what does not go together.  Returns 0, or 2 after a
+ * message. */
+int options_end(struct options *options);
 
 /* Take all options of a command that has only the common ones.
  * Returns -1: go on with argv from optind; or the exit status, after the help

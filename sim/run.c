@@ -1,11 +1,28 @@
 /* A run of any kind. */
 #include "run.h"
 
+#include <stdlib.h>
 #include <string.h>
+
+/* Mode j's start of its k components is the model's. */
+static void pick_start(struct model *model, int j, int k)
+{
+    int n = model->n, a, b;
+    const int *map = k < n ? model->map[j] : NULL;
+
+    for (a = 0; a < k; a++) {
+        int row = j * n + (map != NULL ? map[a] : a);
+
+        model->x0[a] = model->x0[row];
+        for (b = 0; b < k; b++)
+            model->P0[a * k + b]
+                = model->P0[row * n + (map != NULL ? map[b] : b)];
+    }
+}
 
 int run_pick_mode(struct model *model, const struct options *options)
 {
-    int j = options->mode, n = model->n;
+    int j = options->mode, k;
 
     if (!options->kf)
         return options->mode < 0 ? 0
@@ -18,6 +35,7 @@ int run_pick_mode(struct model *model, const struct options *options)
     if (j >= model->M)
         return misuse(options->command, "--mode %d: %s has modes 0 to %d", j,
                       model->path, model->M - 1);
+    k = model->modes[j].n;
     model->modes[0] = model->modes[j];
     if (model->motions != NULL)
         model->motions[0] = model->motions[j];
@@ -26,11 +44,11 @@ int run_pick_mode(struct model *model, const struct options *options)
     if (model->Pi != NULL)
         model->Pi[0] = 1;
     model->mu0[0] = 1;
-    if (model->x0 != NULL) {
-        memmove(model->x0, model->x0 + j * n, (size_t)n * sizeof(jl_real));
-        memmove(model->P0, model->P0 + j * n * n,
-                (size_t)(n * n) * sizeof(jl_real));
-    }
+    if (model->x0 != NULL)
+        pick_start(model, j, k);
+    free(model->map);
+    model->map = NULL;
+    model->n = k;
     model->M = 1;
     return 0;
 }

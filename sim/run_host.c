@@ -104,10 +104,12 @@ static int host_row(struct estimates *e, long row,
         status = JL_EMSG;
     if (status == JL_OK)
         status = estimate->status;
-    if (status == JL_OK)
+    if (status == JL_OK) {
         estimates_note(e, row, estimate->x, estimate->P, estimate->mu,
                        estimate->loglik,
                        is_start ? (double)NAN : clock_us() - before);
+        estimates_judge(e, estimate->verdict);
+    }
     return status;
 }
 

@@ -43,6 +43,7 @@ static void become_pe(int pe, const char *url, const char *run,
                       const struct options *options, pid_t parent)
 {
     char which[16], pes[16], mode[16], timeout[32], wait[32];
+    char gate[32], most[16];
     const char *argv[32];
     int n = 0;
 
@@ -83,6 +84,14 @@ static void become_pe(int pe, const char *url, const char *run,
             argv[n++] = "--mode";
             argv[n++] = mode;
         }
+    }
+    if (options->gate > 0) {
+        snprintf(gate, sizeof gate, "%.17g", options->gate);
+        snprintf(most, sizeof most, "%d", options->gate_most);
+        argv[n++] = "--gate";
+        argv[n++] = gate;
+        argv[n++] = "--gate-most";
+        argv[n++] = most;
     }
     argv[n] = NULL;
     close_range(3, ~0u, 0);             /* LCM's sockets are not for it */

@@ -30,7 +30,7 @@ jl_u32 run_fingerprint(const struct model *model,
                        const struct options *options)
 {
     const char *form = options_form(options);
-    unsigned char more[5];
+    unsigned char more[5 + 4 + JL_REAL_OCTETS];
     jl_u32 crc = jl_crc32(model->fingerprint, (const unsigned char *)form,
                           (int)strlen(form));
 
@@ -39,6 +39,8 @@ jl_u32 run_fingerprint(const struct model *model,
     more[2] = JL_REAL_OCTETS;
     more[3] = (unsigned char)options->topology;
     more[4] = (unsigned char)options->exchange;
+    jl_put_u32(more + 5, (jl_u32)options->gate_most);
+    jl_put_real(more + 9, options_gate(options, model->m));
     return jl_crc32(crc, more, sizeof more);
 }
 
@@ -74,7 +76,7 @@ int run_pe(int pe, const struct model *model, const struct options *options,
     jl_par par = { .failed = JL_OK };   /* also if its init refuses */
 
     if (owner == NULL || buf == NULL || mode_status == NULL || z == NULL
-        || bank_open(&bank, model, options->form) != 0) {
+        || bank_open(&bank, model, options) != 0) {
         complain(model->path, 0, NULL, "no memory for its filter");
         status = JL_ENOMEM;
     } else {

@@ -6,6 +6,7 @@
 #include "bank.h"
 #include "clock.h"
 #include "complain.h"
+#include "diagnostics.h"
 #include "interrupt.h"
 #include "progress.h"
 
@@ -20,7 +21,7 @@ int run_serial(struct estimates *e, const struct model *model,
 
     if (feed_open(&feed, data, model, options) != 0)
         return 2;
-    if (bank_open(&bank, model, options->form) != 0) {
+    if (bank_open(&bank, model, options) != 0) {
         complain(model->path, 0, NULL, "no memory for its filter");
         return 1;
     }
@@ -34,10 +35,14 @@ int run_serial(struct estimates *e, const struct model *model,
         status = bank_prepare(&bank, imm, &meas);
         if (status == JL_OK)
             status = jl_imm_step(imm, meas.z, bank.scratch);
-        if (status == JL_OK || status == JL_STARTED)
+        if (status == JL_OK || status == JL_STARTED) {
             estimates_note(e, row, imm->xhat, imm->Phat, imm->mu, imm->loglik,
                            status == JL_OK ? clock_us() - before
                                            : (double)NAN);
+            estimates_judge(e, imm->verdict);
+            if (e->diagnostics != NULL)
+                diagnostics_note(e->diagnostics, row, imm);
+        }
         if (status == JL_STARTED)
             status = JL_OK;
         if (status == JL_OK && options->live == NULL && interrupted() != NULL)

@@ -69,7 +69,8 @@ static int save_all(const struct estimates *e, const struct live_input *live,
 /* --- words --------------------------------------------------------------- */
 
 static void print_report(const struct estimates *e, const struct estimates *one,
-                         const struct live_input *live, int same)
+                         const struct live_input *live,
+                         const struct options *options, int same)
 {
     const struct live_count *count = &live->count;
     double median, p99, serial, serial_p99;
@@ -82,6 +83,8 @@ static void print_report(const struct estimates *e, const struct estimates *one,
     printf("late       %8lu, or doubled\n", count->late);
     printf("refused    %8lu%s%s\n", count->refused,
            count->refused > 0 ? ", the first: " : "", live->refusal);
+    if (options->gate > 0)
+        printf("rejected   %8ld, by the gate\n", e->rejected);
     printf("steps      %8ld, median %.1f us, p99 %.1f us; serial median "
            "%.1f us\n", steps, median, p99, serial);
     if (same)
@@ -120,7 +123,7 @@ static int compare(const struct estimates *e, const struct live_input *live,
         return 1;
     if (run_serial(&serial, model, &live->data, options) == 0) {
         same = estimates_same(&serial, e);
-        print_report(e, &serial, live, same);
+        print_report(e, &serial, live, options, same);
         status = save_all(e, live, model, options);
         if (status == 0)
             printf("estimates and record: %s\n", options->out);

@@ -111,6 +111,12 @@ jl_real jl_log(jl_real x);
  * Returns JL_OK, or JL_ERANGE for any other x: *s and *c are untouched. */
 int jl_sincos(jl_real *s, jl_real *c, jl_real x);
 
+/* The angle [rad] of the vector (x, y), from -pi to pi, at most 1 ulp off.
+ * All cases of C99's atan2 (F.9.1.4): a zero's sign counts, so (0, -1) is at
+ * pi and (-0, -1) at -pi; two zeros are taken as x = +-1, y = +-0; an infinity
+ * is infinitely further than any number and as far as another; NaN for NaN. */
+jl_real jl_atan2(jl_real y, jl_real x);
+
 #ifdef __cplusplus
 }
 #endif

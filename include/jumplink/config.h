@@ -36,6 +36,12 @@
 #error "JL_MAX_MODES must be 1 to 1024"
 #endif
 
+/* The sizes that have forms of fixed size (kf.h): a file with a line
+ * JL_KF_SIZE(n, m) for each.  A line costs a program only what it names. */
+#ifndef JL_KF_SIZES_FILE
+#define JL_KF_SIZES_FILE "jumplink/kf_sizes.def"
+#endif
+
 /* Processing elements of one run.  Each costs ten octets of a jl_par, so the
  * library and its users must agree. */
 #ifndef JL_MAX_PES

@@ -41,17 +41,6 @@
 extern "C" {
 #endif
 
-/* What every mode rejects, the filter rejects (jl_imm_gate): the modes are only
- * predicted, as if it were missing.  A gate of each mode by itself would be
- * wrong: the mode that rejects avoids a bad likelihood, and wins.
- *
- * Modes may have different states (jl_imm_sizes): position and velocity in one,
- * acceleration too in another.  In the filter every mode has all n components;
- * those that a mode lacks have a stated prior, independent of the others, as
- * the mode's estimate after every prediction.  So the certainty of a mode that
- * has no acceleration does not leak into one that has.
- */
-
 enum {                          /* how to mix */
     JL_MIX_AUTO = 0,            /* sticky where the chain allows it         */
     JL_MIX_GENERAL = 1          /* always the general sums                  */
@@ -73,10 +62,10 @@ typedef struct jl_imm {
     int sticky;                 /* Pi = diag(lambda) + 1 v' is used         */
     int stage;                  /* what may come next; see the calls        */
     int combined;               /* xhat, Phat belong to the present state   */
-    int verdict;                /* on the measurement of the step under way:
-                                   accepted, missing, rejected (imm_stage.h) */
+    int verdict;                /* on the z of the step under way, or of the
+                                   last: JL_ACCEPTED, JL_MISSING, JL_REJECTED */
 
-    /* modes of different states; NULL: all have n */
+    /* of modes that lack components (jl_imm_init_sizes) */
     const int *const *map;      /* [M][modes[j].n]                          */
     const jl_real *prior_x;     /* [n]                                      */
     const jl_real *prior_var;   /* [n]                                      */
@@ -84,7 +73,7 @@ typedef struct jl_imm {
     /* gate */
     jl_real gate;               /* a mode rejects above this nis; 0: no gate */
     int most;                   /* rejections in a row; then accept         */
-    int run;                    /* ... so many by now; 0: the last counted  */
+    int run;                    /* ... so many since the last accepted      */
     unsigned long rejected;     /* all since set                            */
 
     /* the state: valid between steps */
@@ -102,13 +91,13 @@ typedef struct jl_imm {
     unsigned long accepted;     /* ... so many                              */
 
     /* the step under way: mixed, then predicted, then updated */
-    jl_real *xw;                /* [M,n]                                    */
+    jl_real *xw;                /* [M,n] with a gate, of modes that reject,
+                                   predicted only until judge               */
     jl_real *Pw;                /* [M,n,n]                                  */
     jl_real *logc;              /* [M] predicted log-probabilities          */
     jl_real *c;                 /* [M] exp(logc)                            */
     jl_real *l;                 /* [M] log-likelihoods                      */
-    jl_real *nis;               /* [M] nu' S^-1 nu; above the gate: xw, Pw are
-                                   predicted only, until judge              */
+    jl_real *nis;               /* [M] nu' S^-1 nu; 0 without z             */
     jl_real *nu;                /* [M,m] innovations                        */
     jl_real *e;                 /* [M] work                                 */
     jl_real *d;                 /* [2n] work                                */
@@ -127,19 +116,43 @@ typedef struct jl_imm {
 int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
                 const jl_kf_form *form, int mixing, jl_real *mem, int cap);
 
-/* The same with modes of different states, n components in all: mode j has the
- * components map[j][0] < map[j][1] < .. < n (modes[j].n of them; map[j] NULL:
- * all n), and of the others the prior mean prior_x [n] and variance prior_var
- * [n] >= 0.  All arrays outlive the filter.
- * Returns as jl_imm_init, JL_EDIM for a map that is not as said too, and
- * JL_ENONFINITE or JL_ERANGE (a variance below 0) for a prior. */
+/* The same with modes of different states, n components in all: mode j has
+ * modes[j].n of them, map[j][0] < map[j][1] < .. < n in this order (NULL: all).
+ * What it lacks is, after each of its predictions, independent of the rest:
+ *     x_j[i] = prior_x[i],  P_j[i][i] = prior_var[i] > 0
+ * as if it were padded to n by zeros in F and H and a noise of this mean and
+ * variance; but predict and update cost what its own size does.
+ *
+ * The prior says what the component is like when a mode that has it takes over:
+ * an acceleration within +-a at the start of a manoeuvre has mean 0, variance
+ * a^2/3.  A deviation three times too large or small costs little.  With nearly
+ * none, which is how padding goes wrong, every mixing tells the modes that have
+ * the component that it is known, and they are slow to see it change; with a
+ * huge one they forget what they knew.  xhat and Phat count the prior, too.
+ * (Granstrom, Willett, Bar-Shalom 2015, IEEE Trans. AES 51, 2975, on what else
+ * is done.  Yuan, Bar-Shalom, Willett et al. 2012, IEEE Trans. AES 48, 3250, fill
+ * in the receiving mode's own estimate: slow again when that was certain, and
+ * another for each mode, so that there is no sticky mixing.)
+ *
+ *     static const int cv[] = { 0, 1, 3, 4 };     (of x vx ax y vy ay)
+ *     static const int *const map[] = { cv, NULL };
+ *     static const jl_real mean[6], var[6] = { 0, 0, 30, 0, 0, 30 };
+ *
+ * prior_x, prior_var [n] are read only where a mode lacks the component; they
+ * and the maps outlive the filter and do not change.
+ * Returns as jl_imm_init, JL_EDIM also for a map that is not as said, a
+ * component that no mode has, or a form for fixed sizes where one is lacking;
+ * JL_ENONFINITE, JL_ERANGE (a variance that is not above 0) for a prior. */
 int jl_imm_init_sizes(jl_imm *imm, int M, int n, const jl_mode *modes,
                       const int *const *map, const jl_real *prior_x,
                       const jl_real *prior_var, const jl_kf_form *form,
                       int mixing, jl_real *mem, int cap);
 
 /* Gate: as jl_kf_gate, for a measurement whose nis is above `nis` in every mode
- * that is possible.
+ * that is possible: then the modes are only predicted, and mu becomes c.  One
+ * that a mode accepts is used by all: the bits are those without a gate.  (If
+ * each mode had a gate by itself, one that rejects would avoid a bad
+ * likelihood, and win.)  Ends a step under way.
  * Returns JL_OK, or JL_ERANGE (nis not finite or below 0, most below 0). */
 int jl_imm_gate(jl_imm *imm, jl_real nis, int most);
 
@@ -153,14 +166,15 @@ int jl_imm_chain(jl_imm *imm, const jl_real *Pi);
 
 /* Set the state: x [M,n], P [M,n,n], mu [M] (copied); scratch
  * [JL_IMM_SCRATCH(M, n, m)].  A probability of 0 is allowed.  Of components
- * that a mode lacks, the prior is set.
+ * that a mode lacks, x and P are checked (zeros will do) and the prior is set.
  * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF, JL_EPROB; unchanged on
  * error. */
 int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,
                const jl_real *mu, jl_real *scratch);
 
 /* One step: mix, filter, weigh, combine.  z [m], or NULL for a missing
- * measurement: the modes are only predicted, log mu = log c, loglik = 0.
+ * measurement: the modes are only predicted, log mu = log c, loglik = 0; the
+ * same with one that the gate rejects.
  * Returns JL_OK, or the code of the first mode that failed: JL_ENONFINITE,
  * JL_ESINGULAR; the filter is then as before the step. */
 int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch);
@@ -169,7 +183,8 @@ int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch);
  * time and starts the step anew; combine combines the present state and may be
  * called at any time.
  * Returns: as jl_imm_step, and JL_EORDER for filter without mix, or weigh
- * without filter or after a failure.  chain and set end a step under way. */
+ * without filter or after a failure.  chain, set and gate end a step under
+ * way. */
 int jl_imm_mix(jl_imm *imm, jl_real *scratch);
 int jl_imm_filter(jl_imm *imm, const jl_real *z, jl_real *scratch);
 int jl_imm_weigh(jl_imm *imm);
@@ -178,14 +193,17 @@ void jl_imm_combine(jl_imm *imm);
 /* The pieces of mix and filter, for filters spread over several processors:
  * mix = foresee, then mix_mode for every j; filter = predict_mode and
  * update_mode for every j, then judge.  A processor does so for the modes it
- * owns; l[j], nis[j], xw[j], Pw[j] of the others come to it by message; then, if
- * no mode has failed anywhere, it calls judge and weigh.  (It must own a mode:
- * update_mode opens judge and weigh.)
+ * owns; l[j], nis[j], xw[j], Pw[j] of the others come to it by message; then,
+ * if no mode has failed anywhere, it calls judge and weigh.  (It must own a
+ * mode: update_mode opens judge and weigh.)
  * 0 <= j < M; scratch as above.  foresee computes c of all modes from mu of all
  * modes; mix_mode, predict_mode and update_mode leave their result in xw[j],
- * Pw[j], and l[j], nis[j], nu[j].  A mode above the gate stays as predicted;
- * judge, when the measurement is accepted in spite of it, updates it: so every
- * processor does the same for all modes, whoever owns them. */
+ * Pw[j], and l[j], nis[j], nu[j].  With a gate, a mode that rejects, and one
+ * that is impossible (c_j = 0) and has no say, stays as predicted; judge, when
+ * the measurement is accepted, updates it: so every processor does the same for
+ * all modes, whoever owns them.  (Of nis[j] of the others, judge only asks
+ * whether it is above the gate.)
+ * judge returns JL_OK, JL_EORDER, or the code of an update that fails. */
 void jl_imm_foresee(jl_imm *imm);
 void jl_imm_mix_mode(jl_imm *imm, int j, jl_real *scratch);
 int jl_imm_predict_mode(jl_imm *imm, int j, jl_real *scratch);

@@ -14,6 +14,10 @@
  * positive semidefinite where measurements are far better than the prior, as
  * long as R / (H P- H') is above the number type's epsilon; standard is cheaper
  * and fine otherwise; sqrt keeps factors of P and holds where neither does.
+ * Standard subtracts: of R / (H P- H') below epsilon no digit is left, and a
+ * variance may come out negative.  In float that is a gap in a record: after
+ * 957 s, where the ratio is 1e-10, standard gave a variance of the glider of
+ * sim/data below 0; joseph was within 0.003 sigma of double all along.
  * Leading multiplications: predict 3/2 n^3; update joseph 3/2 n^3 + 5/2 n^2 m,
  * standard 3/2 n^2 m.  A form is a const table of functions: a program that
  * names one does not link the other.
@@ -74,7 +78,9 @@ typedef struct jl_innovation {
  *     predict   returns JL_OK or JL_ENONFINITE
  *     update    *innovation is set; returns JL_OK, JL_ESINGULAR, JL_ENONFINITE
  * or the code of a nonlinear mode's function.  On error the outputs are
- * undefined, and no other array has changed. */
+ * undefined, and no other array has changed; but where the nis could be had, or
+ * is too large for a number (infinite, loglik then -infinite), the innovation
+ * is set before JL_ENONFINITE: a gate may reject what cannot be used. */
 typedef struct jl_kf_form {
     int (*predict)(jl_real *xp, jl_real *Pp, const jl_mode *mode,
                    const jl_real *x, const jl_real *P, jl_real *scratch);
@@ -90,10 +96,46 @@ extern const jl_kf_form jl_kf_standard;
 extern const jl_kf_form jl_kf_sqrt;     /* factors U' D U                   */
 extern const jl_kf_form jl_kf_unscented;        /* sigma points; factors    */
 
+/* The form unscented (Julier, Uhlmann, Durrant-Whyte 2000) takes the functions
+ * of a nonlinear mode at 2 n + 1 points,
+ *     x, weight kappa / (n + kappa), and, for P = U' D U,
+ *     x +- sqrt((n + kappa) D_k) U_k, weight 1 / 2 (n + kappa) each,
+ * and the means and covariances of their values; matrices as the form sqrt.  It
+ * needs no Jacobian, and where a Jacobian misses how much a function bends
+ * within a deviation it is the better one.  kappa = 0 is the cubature rule
+ * (Arasaratnam, Haykin 2009); 3 - n, for n <= 3, has a normal distribution's
+ * fourth moments along the points.  As no weight is negative, covariances stay
+ * positive semidefinite.  Leading multiplications: predict 3 n^3, update
+ * 3 n^2 m, with 2 n + 1 calls each. */
+
+/* Forms of fixed size, for the sizes that kf_sizes.def lists: the same bits in
+ * a fraction of the time, for more code.
+ *     &JL_KF_FIXED(standard, 6, 3)    form standard, n = 6, m = 3 */
+#if JL_REAL_FLOAT
+#define JL_KF_FIXED(form, n, m) jl_kf_##form##_##n##_##m##_f32
+#else
+#define JL_KF_FIXED(form, n, m) jl_kf_##form##_##n##_##m
+#endif
+#define JL_KF_SIZE(n, m) \
+    extern const jl_kf_form JL_KF_FIXED(joseph, n, m); \
+    extern const jl_kf_form JL_KF_FIXED(standard, n, m);
+#include JL_KF_SIZES_FILE
+#undef JL_KF_SIZE
+
+/* The form's equal of fixed size n, m, if there is one; else the form itself.
+ * A program that calls it links them all. */
+const jl_kf_form *jl_kf_fixed(const jl_kf_form *form, int n, int m);
+
 #define JL_FORM_SCRATCH(n, m) \
     (3 * (n) * (n) + 4 * (n) * (m) + 2 * (m) * (m) + 5 * ((n) + (m)))
 
 /* --- the filter -------------------------------------------------------- */
+
+enum {                          /* the verdict on a measurement */
+    JL_MISSING = 0,             /* there is none                            */
+    JL_ACCEPTED = 1,
+    JL_REJECTED = 2             /* by the gate                              */
+};
 
 /* Reals of state (x, P, nu) and of scratch.  Scratch means nothing between
  * calls and may be shared by all filters of a thread. */
@@ -107,15 +149,15 @@ typedef struct jl_kf {
     jl_real *x;                 /* [n]                                      */
     jl_real *P;                 /* [n,n] as the form keeps it: jl_kf_cov    */
 
-    /* of the last measurement */
-    jl_innovation innovation;
+    int verdict;                /* on the last z: JL_ACCEPTED, ...          */
+    jl_innovation innovation;   /* of the last that was not missing         */
     jl_real nis_mean;           /* mean nis of those accepted since set     */
     unsigned long accepted;     /* ... so many                              */
 
     /* gate */
     jl_real gate;               /* reject above this nis; 0: accept all     */
     int most;                   /* rejections in a row; then accept         */
-    int run;                    /* ... so many by now; 0: the last counted  */
+    int run;                    /* ... so many since the last accepted      */
     unsigned long rejected;     /* all since set                            */
 } jl_kf;
 
@@ -138,11 +180,14 @@ void jl_kf_cov(const jl_kf *kf, jl_real *P);
 
 /* Gate: a measurement whose nis is above `nis` is rejected, which is as if it
  * were missing; but after `most` rejections in a row the next is accepted, for
- * then it is the filter that is wrong.  nis 0: no gate.  With probability p a
- * good measurement passes the chi-square quantile:
+ * then it is the filter that is wrong.  Missing ones do not end the row: they
+ * say nothing against it.  nis 0: no gate.  With probability p a good
+ * measurement passes the chi-square quantile:
  *     m           1      2      3      4      5      6
  *     p 0.99    6.63   9.21  11.34  13.28  15.09  16.81
  *     p 0.999  10.83  13.82  16.27  18.47  20.52  22.46
+ * What is finite but too large to be used, a z beyond JL_LARGE or an infinite
+ * nis, is an error without a gate, and with one always rejected.
  * Returns JL_OK, or JL_ERANGE (nis not finite or below 0, most below 0). */
 int jl_kf_gate(jl_kf *kf, jl_real nis, int most);
 #define JL_GATE_MOST 5          /* what `most` usually is */
@@ -153,7 +198,7 @@ int jl_kf_gate(jl_kf *kf, jl_real nis, int most);
 int jl_kf_predict(jl_kf *kf, jl_real *scratch);
 
 /* One measurement z [m]; NULL: it is missing, the estimate stays as it is and
- * *loglik is 0, and so it is with one that the gate rejects (kf->run > 0).
+ * *loglik is 0, and so it is with one that the gate rejects (kf->verdict).
  * loglik may be NULL.
  * Returns JL_OK, JL_ENONFINITE (z, or a result), JL_ESINGULAR, or the code of a
  * nonlinear mode's function; on error neither the filter nor *loglik has

@@ -57,8 +57,9 @@ struct jl_mode {
  * *mode is untouched on error. */
 int jl_mode_init(jl_mode *mode, int n, int m, int p, jl_real *mem, int cap);
 
-/* Give a mode its matrices (copied): F [n,n] G [n,p] Q [p,p] w_bar [p] or NULL
- * for 0, H [m,n] R [m,m]; scratch [JL_MODE_SCRATCH(n, m, p)].
+/* Give a mode its matrices (copied): F [n,n] G [n,p] Q [p,p] w_bar [p], H [m,n]
+ * R [m,m]; scratch [JL_MODE_SCRATCH(n, m, p)].  NULL for w_bar is 0, and so it
+ * is for F and H, in modes that have functions in their place.
  * Q must be positive semidefinite, R positive definite.
  * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF; *mode is untouched on
  * error. */
@@ -71,9 +72,13 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
 /* What a mode does that no matrix says, with the noises of its mode:
  *     x(k+1) = f(x(k)) + G (w + w_bar),     z(k) = h(x(k)) + v
  * Each function returns JL_OK, or a negative code of base.h that ends the step
- * (a bearing has no value at range 0: JL_ERANGE); context is handed to each.
+ * (a bearing has no value at range 0: JL_ERANGE).  It must depend on nothing
+ * but its arguments and what context points to, and be the same on every PE;
+ * same bits everywhere need base.h's elementary functions.
  * The forms joseph, standard and sqrt linearise f at the estimate and h at the
- * prediction (extended Kalman filter); the form unscented does not. */
+ * prediction (extended Kalman filter: Jazwinski 1970, chapter 8); the form
+ * unscented does not.  States are averaged as they are: an angle among them
+ * must not be wrapped. */
 typedef struct jl_nonlinear {
     /* y [n] = f(x), x [n]; NULL: the mode's F x */
     int (*f)(jl_real *y, const jl_real *x, void *context);
@@ -83,28 +88,37 @@ typedef struct jl_nonlinear {
     int (*h)(jl_real *z, const jl_real *x, void *context);
     /* H [m,n] = dh/dx at x; NULL: by central differences */
     int (*jacobian_h)(jl_real *H, const jl_real *x, void *context);
-    /* d [m] = a - b, with angles brought to [-pi, pi); d may be a or b.  NULL:
-     * the plain difference. */
+    /* d [m] = a - b, with angles brought to [-pi, pi), of measurements or of
+     * differences; d may be a or b.  NULL: the plain difference. */
     void (*residual)(jl_real *d, const jl_real *a, const jl_real *b,
                      void *context);
     void *context;
+    jl_real kappa;              /* >= 0, usually 0: spread of the points of the
+                                   form unscented (kf.h)                    */
 } jl_nonlinear;
 
 /* Make a mode, which has its noises by jl_mode_set or jl_mode_motion,
  * nonlinear; NULL makes it linear again.  *nonlinear outlives the mode, which
- * later calls of jl_mode_set and jl_mode_motion leave nonlinear. */
-void jl_mode_nonlinear(jl_mode *mode, const jl_nonlinear *nonlinear);
+ * later calls of jl_mode_set and jl_mode_motion leave nonlinear, and
+ * jl_mode_init makes linear.
+ * Returns JL_OK, or JL_ERANGE (kappa not finite or below 0): *mode is
+ * untouched. */
+int jl_mode_nonlinear(jl_mode *mode, const jl_nonlinear *nonlinear);
 
 /* x- and, unless F is NULL, the Jacobian of a mode at x:
  *     xp [n] = f(x) + u, or F x + u;  F [n,n];  x [n];  scratch [3 n]
- * A numerical Jacobian has steps of eps^(1/3) max(|x_i|, 1).
- * Returns JL_OK, or the code of a function of the mode's. */
+ * A numerical Jacobian takes 2 n calls of f with steps of eps^(1/3) s, s =
+ * max(|x_i|, 1).  Its error is about eps^(2/3) (s^2 |f'''| / 6 + |f| / s);
+ * eps^(2/3) = 4e-11 (float: 2e-5).
+ * Returns JL_OK, JL_ENONFINITE (a function gave NaN, or more than JL_LARGE), or
+ * the code of a function. */
 int jl_mode_move(jl_real *xp, jl_real *F, const jl_mode *mode,
                  const jl_real *x, jl_real *scratch);
 
 /* The innovation and, unless H is NULL, the Jacobian of a mode at x:
  *     nu [m] = z - h(x), or z - H x;  H [m,n];  z [m];  scratch [n + 2 m]
- * Returns JL_OK, or the code of a function of the mode's. */
+ * Differences are the residual's, also in a numerical Jacobian.
+ * Returns as jl_mode_move. */
 int jl_mode_sense(jl_real *nu, jl_real *H, const jl_mode *mode,
                   const jl_real *z, const jl_real *x, jl_real *scratch);
 
@@ -113,7 +127,8 @@ int jl_mode_sense(jl_real *nu, jl_real *H, const jl_mode *mode,
 enum {
     JL_MOTION_CV = 1,           /* constant velocity                        */
     JL_MOTION_CA = 2,           /* constant acceleration                    */
-    JL_MOTION_CT = 3            /* coordinated turn of known rate, 2 axes   */
+    JL_MOTION_CT = 3,           /* coordinated turn of known rate, 2 axes   */
+    JL_MOTION_SINGER = 4        /* acceleration that decays                 */
 };
 
 /* A motion along `axes` coordinates.  The state holds per axis position and
@@ -121,29 +136,45 @@ enum {
  * axis; positions are measured with standard deviation sigma_z.  With T the
  * time step, per axis:
  *     CV  F = [1 T; 0 1], G = [T^2/2; T]; with order 3 the acceleration has a
- *         zero row in both
+ *         zero row in both (beside a CA, order 2 and jl_imm_init_sizes see
+ *         manoeuvres sooner)
  *     CA  F = [1 T T^2/2; 0 1 T; 0 0 1], G = [T^2/2; T; 1]       (order 3)
  *     CT  the velocity turns by turn_rate T and the position follows; G as CV
  *         (axes 2; order 2, or 3 with zero acceleration)
- * and Q = accel_std^2 I, R = sigma_z^2 I, one noise an axis. */
+ * and Q = accel_std^2 I, one noise an axis;
+ *     Singer  the acceleration is a Markov process of standard deviation
+ *         accel_std and correlation time tau_s: with a = 1 / tau_s,
+ *         F = [1 T (a T - 1 + exp(-a T)) / a^2; 0 1 (1 - exp(-a T)) / a;
+ *              0 0 exp(-a T)],  W = 2 a accel_std^2 * integral over 0..T of f f'
+ *         where f is F's last column (Singer 1970).  W has full rank: three
+ *         noises an axis.                                     (order 3)
+ * R = sigma_z^2 I.  Singer's F, W, N, q are within 5 JL_EPSILON of themselves,
+ * exp(-a T) within JL_EPSILON of 1, for any T / tau_s. */
 typedef struct jl_motion {
     int kind;                   /* JL_MOTION_...                            */
     int axes;                   /* 1 or more; CT: 2                         */
-    int order;                  /* 2 or 3; CA: 3                            */
+    int order;                  /* 2 or 3; CA, Singer: 3                    */
     jl_real accel_std;          /* [m/s^2] >= 0                             */
     jl_real turn_rate;          /* [rad/s] CT only; may be 0                */
     jl_real sigma_z;            /* [m] > 0                                  */
+    jl_real tau_s;              /* [s] > 0, Singer only                     */
 } jl_motion;
 
-/* Sizes of a motion's mode: n = axes order, m = p = axes. */
+/* The sizes of a motion's mode are n = axes order, m = axes, and p = this:
+ * axes; Singer: 3 axes, as many as n.
+ * Returns p, or JL_EDIM for a motion that is none (axes, order, kind). */
+int jl_motion_noises(const jl_motion *motion);
 
 /* Fill a mode (of the sizes above) for time step dt [s] >= 0; over dt = 0
  * positions and velocities stay.  Cheap enough for every step of an irregular
- * record.
+ * record; and no gap in one is too long: dt may be up to sqrt(JL_LARGE) (float:
+ * 1e9 s), accel_std dt^2 / 2 up to JL_LARGE.  CT turns by turn_rate dt, rounded,
+ * less whole turns: an angle that is off by JL_EPSILON |turn_rate| dt at most,
+ * which becomes a turn in float at 5e7 rad.
  * Returns JL_OK, JL_EDIM (sizes, axes, order, kind), JL_ENONFINITE (a number
  * of the motion or dt above sqrt(JL_LARGE), or a product above JL_LARGE),
- * JL_ERANGE (accel_std < 0, sigma_z^2 < JL_REAL_MIN, |turn_rate| dt > 1024),
- * JL_ETIME (dt < 0); *mode is untouched on error. */
+ * JL_ERANGE (accel_std < 0, sigma_z^2 < JL_REAL_MIN, tau_s <= 0 or tau_s
+ * below 1 / sqrt(JL_LARGE)), JL_ETIME (dt < 0); *mode is untouched on error. */
 int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt);
 
 /* The state after a first measurement z [axes]: x [n] at z with velocity 0 and
@@ -158,6 +189,16 @@ int jl_motion_start(jl_real *x, jl_real *P, const jl_motion *motion,
 /* Transition probabilities over dt [s] >= 0 from mean dwell times:
  *     Pi[i][i] = exp(-dt / sojourn_s[i]), the rest of row i shared evenly
  * Pi [M,M], sojourn_s [M] > 0.  With one mode Pi = 1.
+ *
+ * This is one jump at most: what leaves within dt does not come back.  Exact is
+ * the exponential of the rates, in which it does; the difference is of second
+ * order in dt.  Two modes of 20 s stay with 0.951 over 1 s, where 0.952 is
+ * exact; 0.607 over 10 s, 0.684 exact; but 0.000 over 957 s, 0.500 exact, so
+ * after a long gap they change places, and only small steps go to the
+ * stationary distribution, sojourn_s / sum of sojourn_s.  Those are Pi(dt/k)^k
+ * by jl_mat_mul, or better, as the motions are mixed too, k steps without a
+ * measurement.  With steps h of up to an eighth of the shortest sojourn Pi is
+ * within a tenth of h / that sojourn of the exponential.
  * Returns JL_OK, JL_EDIM, JL_ENONFINITE, JL_ERANGE (a sojourn <= 0), JL_ETIME
  * (dt < 0); Pi is untouched on error. */
 int jl_chain_sojourn(jl_real *Pi, const jl_real *sojourn_s, int M,

@@ -13,6 +13,7 @@
 #define jl_exp jl_exp_f32
 #define jl_log jl_log_f32
 #define jl_sincos jl_sincos_f32
+#define jl_atan2 jl_atan2_f32
 
 #define jl_mat_mul jl_mat_mul_f32
 #define jl_mat_mul_t jl_mat_mul_t_f32
@@ -34,6 +35,7 @@
 #define jl_mode_move jl_mode_move_f32
 #define jl_mode_sense jl_mode_sense_f32
 #define jl_mode_motion jl_mode_motion_f32
+#define jl_motion_noises jl_motion_noises_f32
 #define jl_motion_start jl_motion_start_f32
 #define jl_chain_sojourn jl_chain_sojourn_f32
 #define jl_chain_check jl_chain_check_f32
@@ -44,6 +46,7 @@
 #define jl_kf_standard jl_kf_standard_f32
 #define jl_kf_sqrt jl_kf_sqrt_f32
 #define jl_kf_unscented jl_kf_unscented_f32
+#define jl_kf_fixed jl_kf_fixed_f32
 #define jl_kf_init jl_kf_init_f32
 #define jl_kf_set jl_kf_set_f32
 #define jl_kf_cov jl_kf_cov_f32

@@ -58,6 +58,8 @@ typedef struct jl_meas {
 typedef struct jl_estimate {
     jl_u32 seq;
     int status;                 /* JL_OK or why the step failed             */
+    int verdict;                /* JL_ACCEPTED, JL_REJECTED; or JL_MISSING,
+                                   also of one that a record starts with    */
     jl_real loglik;
     jl_real *x;                 /* [n]                                      */
     jl_real *P;                 /* [n,n]                                    */
@@ -111,7 +113,8 @@ int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,
  * for models rebuilt for meas->dt (jl_mode_motion, then jl_imm_chain), or
  * started from a first measurement (jl_imm_set).  Must do the same on every
  * PE, and if it changes a mode it must also call jl_imm_chain or jl_imm_set,
- * which void what was computed ahead.
+ * which void what was computed ahead.  (A mode that other PEs own is used, too:
+ * judge, imm.h, may have to update it.)
  * Returns JL_OK (now the step), JL_STARTED (the measurement was used to set
  * the state: no step), or a negative code: the step fails with it. */
 #define JL_STARTED 1
@@ -179,9 +182,10 @@ int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
 
 /* Serve until the host says stop: first all PEs tell PE0 that they are ready,
  * and PE0 tells them and the host that all are; then step after step.  A
- * measurement that cannot be used (not of the model's size, not finite, a
- * number or a time that goes back) is refused: the host is told why.  scratch
- * [JL_IMM_SCRATCH(M, n, m)], for all three calls; `prepare` may use it too.
+ * measurement that cannot be used (not of the model's size, not finite, without
+ * a gate also beyond JL_LARGE, a number or a time that goes back) is refused:
+ * the host is told why.  scratch [JL_IMM_SCRATCH(M, n, m)], for all three calls;
+ * `prepare` may use it too.
  * Returns JL_OK after a stop, JL_EMODEL (the fingerprints differ), or the error
  * of the channel that failed, here or at another PE: par->failed_pe says to
  * which PE, the one that is to blame as far as this PE was told. */
@@ -191,9 +195,10 @@ int jl_par_serve(jl_par *par, jl_real *scratch);
  * this: returns on all of them that own modes the same JL_OK or code of the
  * first mode that failed, as jl_imm_step, or JL_ECHAIN (an all-reduce and a
  * chain that is not sticky), JL_EGATE (an all-reduce and a gate: a PE's pool
- * would depend on the verdict of all); or the error of the channel that failed.  The
- * combined estimate is computed on PE0 (on the others call jl_imm_combine; an
- * all-reduce computes it on all, and jl_imm_combine is of no use).
+ * would depend on the verdict of all); or the error of the channel that failed.
+ * The combined estimate is computed on PE0 (on the others call jl_imm_combine;
+ * an all-reduce computes it on all, and jl_imm_combine is of no use).  Of nis,
+ * nu and nis_mean a PE knows those of its own modes.
  * After the error of a channel the PEs may differ: the run is over. */
 int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch);
 

@@ -32,6 +32,15 @@ JL_INLINE jl_real jli_pow2(int k)
     return x;
 }
 
+/* Whether the sign is set: of -0, too. */
+JL_INLINE int jli_negative(jl_real x)
+{
+    jl_u32 word;
+
+    memcpy(&word, &x, sizeof word);
+    return (int)(word >> 31);
+}
+
 /* x = (1 + (top + low 2^-JLI_LOW_BITS) 2^-JLI_TOP_BITS) 2^e, x > 0, normal.
  * Returns e. */
 JL_INLINE int jli_split(jl_u32 *top, jl_u32 *low, jl_real x)
@@ -72,6 +81,14 @@ JL_INLINE jl_real jli_pow2(int k)               /* -1022 <= k <= 1023 */
     words[!jli_first_word()] = 0;
     memcpy(&x, words, sizeof x);
     return x;
+}
+
+JL_INLINE int jli_negative(jl_real x)
+{
+    jl_u32 words[2];
+
+    memcpy(words, &x, sizeof words);
+    return (int)(words[jli_first_word()] >> 31);
 }
 
 JL_INLINE int jli_split(jl_u32 *top, jl_u32 *low, jl_real x)

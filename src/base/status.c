@@ -52,7 +52,7 @@ const char *jl_status_text(int status)
     case JL_EMSG:
         return "message that does not belong here";
     case JL_EMODEL:
-        return "the PEs were given different models, filters, forms or "
+        return "the PEs have different models, filters, forms, gates or "
                "topologies";
     case JL_ESILENT:
         return "nothing heard from the other end for too long";

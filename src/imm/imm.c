@@ -43,47 +43,14 @@ static void layout(jl_imm *imm, jl_real *mem)
     imm->nu = imm->v + M;
 }
 
-/* Whether form and map fit the modes; n components in all. */
-static int sizes_fit(int M, int n, const jl_mode *modes,
-                     const int *const *map, const jl_kf_form *form)
-{
-    int j, i;
-
-    if (form->n != 0 && (form->n != n || form->m != modes[0].m))
-        return 0;
-    for (j = 0; j < M; j++) {
-        const int *at = map != NULL ? map[j] : NULL;
-
-        if (modes[j].m != modes[0].m || modes[j].n > n
-            || (modes[j].n < n && (at == NULL || form->n != 0)))
-            return 0;
-        for (i = 0; at != NULL && i < modes[j].n; i++)
-            if (at[i] <= (i > 0 ? at[i - 1] : -1) || at[i] >= n)
-                return 0;
-    }
-    return 1;
-}
-
-static int check_prior(const jl_real *x, const jl_real *var, int n)
-{
-    int i;
-
-    if (!jl_vec_within(x, n, JL_LARGE)
-        || !jl_vec_within(var, n, JL_LARGE * JL_LARGE))
-        return JL_ENONFINITE;
-    for (i = 0; i < n; i++)
-        if (var[i] < 0)
-            return JL_ERANGE;
-    return JL_OK;
-}
-
-/* Of components that mode j lacks, the prior. */
+/* Of components that mode j lacks, the prior; scratch [k + k k + n], which is
+ * at most [n + n n] as k < n. */
 static void set_prior(jl_imm *imm, int j, jl_real *scratch)
 {
     int n = imm->n, k = imm->modes[j].n;
     jl_real *x = imm->x + j * n, *P = imm->P + j * n * n;
 
-    if (imm->map == NULL)
+    if (!JLI_LACKS(imm, j))
         return;
     jli_own_states(scratch, scratch + k, imm, j, x, P, scratch + k + k * k);
     jli_all_states(x, P, imm, j, scratch, scratch + k);
@@ -96,6 +63,7 @@ static void forget(jl_imm *imm)
     imm->accepted = 0;
     imm->rejected = 0;
     imm->run = 0;
+    imm->verdict = JL_MISSING;
     imm->loglik = 0;
     imm->stage = JLI_IDLE;
 }
@@ -105,14 +73,12 @@ int jl_imm_init_sizes(jl_imm *imm, int M, int n, const jl_mode *modes,
                       const jl_real *prior_var, const jl_kf_form *form,
                       int mixing, jl_real *mem, int cap)
 {
-    int i, j, status = JL_OK;
+    int i, j, status;
 
     if (M < 1 || M > JL_MAX_MODES || n < 1 || n > JL_MAX_STATES
-        || (mixing != JL_MIX_AUTO && mixing != JL_MIX_GENERAL)
-        || !sizes_fit(M, n, modes, map, form))
+        || (mixing != JL_MIX_AUTO && mixing != JL_MIX_GENERAL))
         return JL_EDIM;
-    if (map != NULL)
-        status = check_prior(prior_x, prior_var, n);
+    status = jli_check_sizes(M, n, modes, map, prior_x, prior_var, form);
     if (status != JL_OK)
         return status;
     if (cap < JL_IMM_STATE(M, n, modes[0].m))

@@ -7,7 +7,13 @@ int jl_imm_gate(jl_imm *imm, jl_real nis, int most)
         return JL_ERANGE;
     imm->gate = nis;
     imm->most = most;
+    imm->stage = JLI_IDLE;
     return JL_OK;
+}
+
+static int is_possible(const jl_imm *imm, int j)
+{
+    return imm->logc[j] >= -JL_REAL_MAX;
 }
 
 static int rejects(const jl_imm *imm, int j)
@@ -15,15 +21,24 @@ static int rejects(const jl_imm *imm, int j)
     return imm->gate > 0 && imm->nis[j] > imm->gate;
 }
 
-/* Every mode that is possible rejects, and not too often in a row. */
+int jli_imm_waits(const jl_imm *imm, int j)
+{
+    return rejects(imm, j) || (imm->gate > 0 && !is_possible(imm, j));
+}
+
+/* Every mode that is possible rejects, and not too often in a row, unless one
+ * of them cannot use the measurement: its likelihood is 0. */
 static int all_reject(const jl_imm *imm)
 {
-    int j;
+    int j, unusable = 0;
 
     for (j = 0; j < imm->M; j++)
-        if (imm->logc[j] >= -JL_REAL_MAX && !rejects(imm, j))
-            return 0;
-    return imm->run < imm->most;
+        if (is_possible(imm, j)) {
+            if (!rejects(imm, j))
+                return 0;
+            unusable |= imm->l[j] < -JL_REAL_MAX;
+        }
+    return unusable || imm->run < imm->most;
 }
 
 int jl_imm_judge(jl_imm *imm, const jl_real *z, jl_real *scratch)
@@ -33,12 +48,12 @@ int jl_imm_judge(jl_imm *imm, const jl_real *z, jl_real *scratch)
     if (imm->stage != JLI_FILTERED)
         return JL_EORDER;
     imm->stage = JLI_JUDGED;
-    imm->verdict = z == NULL ? JLI_MISSING
-        : all_reject(imm) ? JLI_REJECTED : JLI_ACCEPTED;
+    imm->verdict = z == NULL ? JL_MISSING
+        : all_reject(imm) ? JL_REJECTED : JL_ACCEPTED;
     for (j = 0; j < imm->M && status == JL_OK; j++) {
-        if (imm->verdict != JLI_ACCEPTED)
+        if (imm->verdict != JL_ACCEPTED)
             imm->l[j] = 0;
-        else if (rejects(imm, j))
+        else if (jli_imm_waits(imm, j))
             status = jli_imm_update(imm, j, z, 0, scratch);
     }
     return status;

@@ -10,9 +10,6 @@ enum {
     JLI_FAILED = 4
 };
 
-/* The verdict on a measurement. */
-enum { JLI_ACCEPTED = 0, JLI_MISSING = 1, JLI_REJECTED = 2 };
-
 /* Probabilities above this are summed as they are: terms of such a sum that
  * have underflowed are below eps^2 of it.  Sums below it, zero included, are
  * formed from logarithms. */
@@ -21,6 +18,8 @@ enum { JLI_ACCEPTED = 0, JLI_MISSING = 1, JLI_REJECTED = 2 };
 #if JL_REAL_FLOAT
 #define jli_log_sum_exp jli_log_sum_exp_f32
 #define jli_imm_update jli_imm_update_f32
+#define jli_imm_waits jli_imm_waits_f32
+#define jli_check_sizes jli_check_sizes_f32
 #define jli_own_states jli_own_states_f32
 #define jli_all_states jli_all_states_f32
 #endif
@@ -29,14 +28,25 @@ enum { JLI_ACCEPTED = 0, JLI_MISSING = 1, JLI_REJECTED = 2 };
  * exp(v - max), *sum is the sum of those. */
 jl_real jli_log_sum_exp(jl_real *v, int n, jl_real *sum);
 
-/* Update mode j in xw, Pw, unless its nis is above the gate (0: none). */
+/* Update mode j in xw, Pw; with a gate, unless it waits for the verdict. */
 int jli_imm_update(jl_imm *imm, int j, const jl_real *z, jl_real gate,
                    jl_real *scratch);
 
-/* --- modes of different states (imm_sizes.c); only where there are maps ---- */
+/* 1 if mode j is updated only when all know that the measurement is accepted:
+ * it is outside its gate; or the mode is impossible, and has no say. */
+int jli_imm_waits(const jl_imm *imm, int j);
 
-/* What mode j has of the n components of (x, P), into (own_x, own_P); and all n
- * again, with the prior of those that it lacks.  scratch [n] */
+/* --- modes of different states (imm_sizes.c) ------------------------------ */
+
+#define JLI_LACKS(imm, j) ((imm)->modes[j].n < (imm)->n)
+
+/* What jl_imm_init_sizes is given: JL_OK, JL_EDIM, or a prior's code. */
+int jli_check_sizes(int M, int n, const jl_mode *modes,
+                    const int *const *map, const jl_real *prior_x,
+                    const jl_real *prior_var, const jl_kf_form *form);
+
+/* Of a mode that lacks components: what it has of (x, P), into (own_x, own_P),
+ * scratch [n]; and all n again, with the prior of what it lacks. */
 void jli_own_states(jl_real *own_x, jl_real *own_P, const jl_imm *imm, int j,
                     const jl_real *x, const jl_real *P, jl_real *scratch);
 void jli_all_states(jl_real *x, jl_real *P, const jl_imm *imm, int j,

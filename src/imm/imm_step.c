@@ -1,6 +1,7 @@
 /* Stages 2 and 3, and the four in one. */
 #include "imm/imm_stage.h"
 
+#include "kf/kf_gate.h"
 #include "mat/mat_k.h"
 
 /* Where a mode's own estimate is, and where what becomes of it goes first. */
@@ -20,7 +21,7 @@ static struct place own(const jl_imm *imm, int j, jl_real *scratch)
     p.rest = p.new_P + k * k;
     p.x = imm->xw + j * n;
     p.P = imm->Pw + j * n * n;
-    if (imm->map != NULL) {
+    if (JLI_LACKS(imm, j)) {
         jl_real *x = p.rest, *P = x + k;
 
         jli_own_states(x, P, imm, j, p.x, p.P, P + k * k);
@@ -36,7 +37,7 @@ static void put_back(jl_imm *imm, int j, const struct place *p)
     int n = imm->n;
     jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
 
-    if (imm->map != NULL) {
+    if (JLI_LACKS(imm, j)) {
         jli_all_states(x, P, imm, j, p->new_x, p->new_P);
     } else {
         jli_copy(x, p->new_x, n);
@@ -67,15 +68,15 @@ int jli_imm_update(jl_imm *imm, int j, const jl_real *z, jl_real gate,
     int status;
 
     got.nu = imm->nu + j * imm->m;
-    status = imm->form->update(p.new_x, p.new_P, &got, &imm->modes[j], p.x,
-                               p.P, z, p.rest);
+    status = jli_gated_update(p.new_x, p.new_P, &got, imm->form,
+                              &imm->modes[j], p.x, p.P, z, gate, p.rest);
     if (status != JL_OK) {
         imm->stage = JLI_FAILED;
         return status;
     }
     imm->l[j] = got.loglik;
     imm->nis[j] = got.nis;
-    if (!(gate > 0 && got.nis > gate))
+    if (!(gate > 0 && jli_imm_waits(imm, j)))
         put_back(imm, j, &p);
     return JL_OK;
 }
@@ -88,6 +89,7 @@ int jl_imm_update_mode(jl_imm *imm, int j, const jl_real *z,
         imm->stage = JLI_FILTERED;
     if (z == NULL) {
         imm->l[j] = 0;
+        imm->nis[j] = 0;
         return JL_OK;
     }
     return jli_imm_update(imm, j, z, imm->gate, scratch);
@@ -129,16 +131,17 @@ static jl_real best_likelihood(const jl_imm *imm)
     return best;
 }
 
+/* As in kf.c, counts stay where they are as large as can be. */
 static void count(jl_imm *imm)
 {
     int j;
 
-    if (imm->verdict == JLI_REJECTED) {
-        imm->run++;
+    if (imm->verdict == JL_REJECTED) {
+        imm->run += imm->run < INT_MAX;
         imm->rejected++;
-    } else if (imm->verdict == JLI_ACCEPTED) {
+    } else if (imm->verdict == JL_ACCEPTED) {
         imm->run = 0;
-        imm->accepted++;
+        imm->accepted += imm->accepted < ULONG_MAX;
         for (j = 0; j < imm->M; j++)
             imm->nis_mean[j] += (imm->nis[j] - imm->nis_mean[j])
                 / (jl_real)imm->accepted;
@@ -162,7 +165,7 @@ int jl_imm_weigh(jl_imm *imm)
         imm->logmu[j] -= lse;
         imm->mu[j] = e[j] / sum;
     }
-    imm->loglik = imm->verdict == JLI_ACCEPTED ? best + lse : 0;
+    imm->loglik = imm->verdict == JL_ACCEPTED ? best + lse : 0;
     count(imm);
     swap(&imm->x, &imm->xw);
     swap(&imm->P, &imm->Pw);

@@ -1,13 +1,13 @@
 /* Estimates that keep the covariance itself. */
 #include "kf/cov_k.h"
 
-static void take(jl_real *S, const jl_real *P, jl_real *scratch, int n)
+void jli_full_take(jl_real *S, const jl_real *P, jl_real *scratch, int n)
 {
     jl_mat_pack(scratch, P, n);         /* exactly symmetric from here on */
     jl_mat_unpack(S, scratch, n);
 }
 
-static void give(jl_real *P, const jl_real *S, int n)
+void jli_full_give(jl_real *P, const jl_real *S, int n)
 {
     jli_copy(P, S, n * n);
 }
@@ -50,5 +50,6 @@ void jli_full_whole(jl_real *Sn, const jl_real *S, const int *map,
             Sn[map[i] * n + map[j]] = S[i * k + j];
 }
 
-const jl_cov jl_cov_full = { 0, take, give, pool, blend, jli_full_part,
-                             jli_full_whole };
+const jl_cov jl_cov_full = {
+    0, jli_full_take, jli_full_give, pool, blend, jli_full_part, jli_full_whole
+};

@@ -8,10 +8,14 @@
 #include "mat/mat_k.h"
 
 #if JL_REAL_FLOAT
+#define jli_full_take jli_full_take_f32
+#define jli_full_give jli_full_give_f32
 #define jli_full_part jli_full_part_f32
 #define jli_full_whole jli_full_whole_f32
 #endif
 
+void jli_full_take(jl_real *S, const jl_real *P, jl_real *scratch, int n);
+void jli_full_give(jl_real *P, const jl_real *S, int n);
 void jli_full_part(jl_real *S, const jl_real *Sn, const int *map,
                    jl_real *scratch, int k, int n);
 void jli_full_whole(jl_real *Sn, const jl_real *S, const int *map,

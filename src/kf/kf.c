@@ -1,6 +1,6 @@
 /* The Kalman filter as an object: a form's steps, committed when they went
  * well. */
-#include "jumplink/kf.h"
+#include "kf/kf_gate.h"
 
 #include "mat/mat_k.h"
 
@@ -36,6 +36,7 @@ static void forget(jl_kf *kf)
     kf->accepted = 0;
     kf->rejected = 0;
     kf->run = 0;
+    kf->verdict = JL_MISSING;
 }
 
 int jl_kf_set(jl_kf *kf, const jl_real *x, const jl_real *P,
@@ -59,15 +60,6 @@ void jl_kf_cov(const jl_kf *kf, jl_real *P)
     kf->form->cov->give(P, kf->P, kf->mode->n);
 }
 
-int jl_kf_gate(jl_kf *kf, jl_real nis, int most)
-{
-    if (!(nis >= 0 && nis <= JL_REAL_MAX) || most < 0)
-        return JL_ERANGE;
-    kf->gate = nis;
-    kf->most = most;
-    return JL_OK;
-}
-
 int jl_kf_predict(jl_kf *kf, jl_real *scratch)
 {
     int n = kf->mode->n, status;
@@ -79,72 +71,71 @@ int jl_kf_predict(jl_kf *kf, jl_real *scratch)
     return status;
 }
 
-/* Take down what an update gave: the estimate xP [n + n n] unless the gate
- * rejects it.  Returns 1 if it is accepted. */
-static int commit(jl_kf *kf, const jl_real *xP, const jl_innovation *got)
+/* Above this nis a measurement is rejected; 0: never. */
+static jl_real limit(const jl_kf *kf)
+{
+    return kf->gate > 0 && kf->run >= kf->most ? JL_REAL_MAX : kf->gate;
+}
+
+/* Counts stay where they are as large as can be: a mean divides by one, and one
+ * that is signed must not overflow. */
+static void count(jl_kf *kf, const jl_innovation *got)
 {
     jl_real *nu = kf->innovation.nu;
-    int n = kf->mode->n;
 
     jli_copy(nu, got->nu, kf->mode->m);
     kf->innovation = *got;
     kf->innovation.nu = nu;
-    if (kf->gate > 0 && got->nis > kf->gate && kf->run < kf->most) {
-        kf->run++;
+    if (kf->verdict == JL_REJECTED) {
+        kf->run += kf->run < INT_MAX;
         kf->rejected++;
-        return 0;
+    } else {
+        kf->run = 0;
+        kf->accepted += kf->accepted < ULONG_MAX;
+        kf->nis_mean += (got->nis - kf->nis_mean) / (jl_real)kf->accepted;
     }
-    kf->run = 0;
-    kf->accepted++;
-    kf->nis_mean += (got->nis - kf->nis_mean) / (jl_real)kf->accepted;
-    jli_copy(kf->x, xP, n + n * n);
-    return 1;
+}
+
+/* The prediction xp [n + n n], and z or NULL, become the estimate. */
+static int absorb(jl_kf *kf, jl_real *loglik, const jl_real *xp,
+                  const jl_real *z, jl_real *scratch)
+{
+    int n = kf->mode->n, status, verdict = JL_MISSING;
+    jl_real *x = scratch, *nu = x + n + n * n, gate = limit(kf);
+    jl_innovation got;
+
+    if (z != NULL) {
+        got.nu = nu;
+        status = jli_gated_update(x, x + n, &got, kf->form, kf->mode, xp,
+                                  xp + n, z, gate, nu + kf->mode->m);
+        if (status != JL_OK)
+            return status;
+        verdict = gate > 0 && got.nis > gate ? JL_REJECTED : JL_ACCEPTED;
+    }
+    kf->verdict = verdict;
+    if (z != NULL)
+        count(kf, &got);
+    if (verdict == JL_ACCEPTED)
+        jli_copy(kf->x, x, n + n * n);
+    else if (xp != kf->x)
+        jli_copy(kf->x, xp, n + n * n);
+    if (loglik != NULL)
+        *loglik = verdict == JL_ACCEPTED ? got.loglik : 0;
+    return JL_OK;
 }
 
 int jl_kf_update(jl_kf *kf, jl_real *loglik, const jl_real *z,
                  jl_real *scratch)
 {
-    int n = kf->mode->n, status;
-    jl_real *x = scratch, *P = x + n, l = 0;
-    jl_innovation got;
-
-    if (z != NULL) {
-        got.nu = P + n * n;
-        status = kf->form->update(x, P, &got, kf->mode, kf->x, kf->P, z,
-                                  got.nu + kf->mode->m);
-        if (status != JL_OK)
-            return status;
-        if (commit(kf, x, &got))
-            l = got.loglik;
-    }
-    if (loglik != NULL)
-        *loglik = l;
-    return JL_OK;
+    return absorb(kf, loglik, kf->x, z, scratch);
 }
 
 int jl_kf_step(jl_kf *kf, jl_real *loglik, const jl_real *z,
                jl_real *scratch)
 {
     int n = kf->mode->n, status;
-    jl_real *xp = scratch, *x = xp + n + n * n, *nu = x + n + n * n, l = 0;
-    jl_real *rest = nu + kf->mode->m;
-    jl_innovation got;
+    jl_real *xp = scratch, *rest = xp + n + n * n;
 
     status = kf->form->predict(xp, xp + n, kf->mode, kf->x, kf->P, rest);
-    if (status != JL_OK)
-        return status;
-    if (z != NULL) {
-        got.nu = nu;
-        status = kf->form->update(x, x + n, &got, kf->mode, xp, xp + n, z,
-                                  rest);
-        if (status != JL_OK)
-            return status;
-        if (commit(kf, x, &got))
-            l = got.loglik;
-    }
-    if (z == NULL || kf->run > 0)
-        jli_copy(kf->x, xp, n + n * n);         /* x and P */
-    if (loglik != NULL)
-        *loglik = l;
-    return JL_OK;
+    return status == JL_OK ? absorb(kf, loglik, xp, z, rest) : status;
 }

@@ -45,6 +45,20 @@ static void set_noises(jl_mode *mode, const jl_real *G, const jl_real *UD)
     }
 }
 
+/* NULL stands for zeros. */
+static int within(const jl_real *v, int n)
+{
+    return v == NULL || jl_vec_within(v, n, JL_LARGE);
+}
+
+static void put(jl_real *to, const jl_real *from, int n)
+{
+    if (from != NULL)
+        jli_copy(to, from, n);
+    else
+        memset(to, 0, (size_t)n * sizeof *to);
+}
+
 int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
                 const jl_real *Q, const jl_real *w_bar, const jl_real *H,
                 const jl_real *R, jl_real *scratch)
@@ -53,9 +67,8 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
     jl_real *W = scratch, *GQ = W + n * n, *L = GQ + n * (p + 1);
     jl_real *work = L + m * m;
 
-    if (!jl_vec_within(F, n * n, JL_LARGE) || !jl_vec_within(G, n * p, JL_LARGE)
-        || !jl_vec_within(H, m * n, JL_LARGE)
-        || (w_bar != NULL && !jl_vec_within(w_bar, p, JL_LARGE)))
+    if (!within(F, n * n) || !jl_vec_within(G, n * p, JL_LARGE)
+        || !within(H, m * n) || !within(w_bar, p))
         return JL_ENONFINITE;
     status = jl_mat_check_cov(Q, work, p);
     if (status != JL_OK)
@@ -73,13 +86,11 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
         jli_apply(GQ, G, w_bar, NULL, n, p);
         if (!jl_vec_within(GQ, n, JL_LARGE))
             return JL_ENONFINITE;
-        jli_copy(mode->u, GQ, n);
-    } else {
-        memset(mode->u, 0, (size_t)n * sizeof *mode->u);
     }
+    put(mode->u, w_bar != NULL ? GQ : NULL, n);
+    put(mode->F, F, n * n);
+    put(mode->H, H, m * n);
     jli_copy(mode->W, W, n * n);
-    jli_copy(mode->F, F, n * n);
-    jli_copy(mode->H, H, m * n);
     jl_mat_pack(L, R, m);               /* exactly symmetric from here on */
     jl_mat_unpack(mode->R, L, m);
     jl_mat_ud(mode->V, mode->R, work, m);

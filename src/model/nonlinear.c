@@ -3,22 +3,26 @@
 
 #include "mat/mat_k.h"
 
-void jl_mode_nonlinear(jl_mode *mode, const jl_nonlinear *nonlinear)
+int jl_mode_nonlinear(jl_mode *mode, const jl_nonlinear *nonlinear)
 {
+    if (nonlinear != NULL
+        && !(nonlinear->kappa >= 0 && nonlinear->kappa <= JL_LARGE))
+        return JL_ERANGE;
     mode->nonlinear = nonlinear;
     mode->move = nonlinear != NULL ? jl_mode_move : NULL;
     mode->sense = nonlinear != NULL ? jl_mode_sense : NULL;
+    return JL_OK;
 }
 
-/* J [rows,n] of a function by central differences, whose error falls with the
- * step's square while rounding grows with its inverse: eps^(1/3) balances. */
-#if JL_REAL_FLOAT
-#define STEP JL_C(4.9e-3)
-#else
-#define STEP JL_C(6.1e-6)
-#endif
-
-typedef int (*function)(jl_real *y, const jl_real *x, void *context);
+/* What a function of the mode's returned, and v [n], what it computed: a form
+ * that keeps factors must never see what is not finite. */
+static int checked(int status, const jl_real *v, int n)
+{
+    JL_ASSERT(status <= JL_OK);
+    if (status != JL_OK)
+        return status;
+    return jl_vec_within(v, n, JL_LARGE) ? JL_OK : JL_ENONFINITE;
+}
 
 static void plain_difference(jl_real *d, const jl_real *a, const jl_real *b,
                              int n)
@@ -29,30 +33,44 @@ static void plain_difference(jl_real *d, const jl_real *a, const jl_real *b,
         d[i] = a[i] - b[i];
 }
 
-/* scratch [n + 2 rows]; residual may be NULL */
-static int differences(jl_real *J, function of, const jl_nonlinear *nonlinear,
-                       void (*residual)(jl_real *d, const jl_real *a,
-                                        const jl_real *b, void *context),
-                       const jl_real *x, jl_real *scratch, int rows, int n)
+/* --- Jacobians ----------------------------------------------------------- */
+
+/* The error of central differences falls with the square of their step, that of
+ * rounding grows with its inverse: eps^(1/3) balances them. */
+#if JL_REAL_FLOAT
+#define STEP JL_C(4.918e-3)
+#else
+#define STEP JL_C(6.055e-6)
+#endif
+
+typedef int (*function)(jl_real *y, const jl_real *x, void *context);
+typedef void (*difference)(jl_real *d, const jl_real *a, const jl_real *b,
+                           void *context);
+
+/* J [rows,n] of a function at x; residual may be NULL; scratch [n + 2 rows] */
+static int differences(jl_real *J, function of, difference residual,
+                       void *context, const jl_real *x, jl_real *scratch,
+                       int rows, int n)
 {
     jl_real *at = scratch, *up = at + n, *down = up + rows;
     int i, a, status;
 
     jli_copy(at, x, n);
     for (i = 0; i < n; i++) {
-        jl_real size = jli_abs(x[i]) > 1 ? jli_abs(x[i]) : 1, above, below;
+        jl_real step = STEP * (jli_abs(x[i]) > 1 ? jli_abs(x[i]) : 1);
+        jl_real above = x[i] + step, below = x[i] - step;
 
-        above = at[i] = x[i] + STEP * size;
-        status = of(up, at, nonlinear->context);
+        at[i] = above;
+        status = of(up, at, context);
         if (status != JL_OK)
             return status;
-        below = at[i] = x[i] - STEP * size;
-        status = of(down, at, nonlinear->context);
+        at[i] = below;
+        status = of(down, at, context);
         if (status != JL_OK)
             return status;
         at[i] = x[i];
         if (residual != NULL)
-            residual(up, up, down, nonlinear->context);
+            residual(up, up, down, context);
         else
             plain_difference(up, up, down, rows);
         for (a = 0; a < rows; a++)
@@ -60,6 +78,8 @@ static int differences(jl_real *J, function of, const jl_nonlinear *nonlinear,
     }
     return JL_OK;
 }
+
+/* --- the two models ------------------------------------------------------ */
 
 int jl_mode_move(jl_real *xp, jl_real *F, const jl_mode *mode,
                  const jl_real *x, jl_real *scratch)
@@ -73,37 +93,43 @@ int jl_mode_move(jl_real *xp, jl_real *F, const jl_mode *mode,
             jli_copy(F, mode->F, n * n);
         return JL_OK;
     }
-    status = nl->f(xp, x, nl->context);
-    if (status == JL_OK && F != NULL)
-        status = nl->jacobian_f != NULL ? nl->jacobian_f(F, x, nl->context)
-            : differences(F, nl->f, nl, NULL, x, scratch, n, n);
+    status = checked(nl->f(xp, x, nl->context), xp, n);
+    if (status != JL_OK)
+        return status;
     for (i = 0; i < n; i++)
         xp[i] += mode->u[i];
-    return status;
+    if (F == NULL)
+        return JL_OK;
+    status = nl->jacobian_f != NULL ? nl->jacobian_f(F, x, nl->context)
+        : differences(F, nl->f, NULL, nl->context, x, scratch, n, n);
+    return checked(status, F, n * n);
 }
 
 int jl_mode_sense(jl_real *nu, jl_real *H, const jl_mode *mode,
                   const jl_real *z, const jl_real *x, jl_real *scratch)
 {
     const jl_nonlinear *nl = mode->nonlinear;
-    int n = mode->n, m = mode->m, status = JL_OK;
+    int n = mode->n, m = mode->m, status;
 
     if (nl == NULL || nl->h == NULL) {
         jli_apply(nu, mode->H, x, NULL, m, n);
         if (H != NULL)
             jli_copy(H, mode->H, m * n);
     } else {
-        status = nl->h(nu, x, nl->context);
-        if (status == JL_OK && H != NULL)
+        status = checked(nl->h(nu, x, nl->context), nu, m);
+        if (status == JL_OK && H != NULL) {
             status = nl->jacobian_h != NULL
                 ? nl->jacobian_h(H, x, nl->context)
-                : differences(H, nl->h, nl, nl->residual, x, scratch, m, n);
+                : differences(H, nl->h, nl->residual, nl->context, x,
+                              scratch, m, n);
+            status = checked(status, H, m * n);
+        }
+        if (status != JL_OK)
+            return status;
     }
-    if (status != JL_OK)
-        return status;
     if (nl != NULL && nl->residual != NULL)
-        nl->residual(nu, z, nu, nl->context);   /* d may be b, too */
+        nl->residual(nu, z, nu, nl->context);
     else
         plain_difference(nu, z, nu, m);
-    return JL_OK;
+    return jl_vec_within(nu, m, JL_REAL_MAX) ? JL_OK : JL_ENONFINITE;
 }

@@ -105,6 +105,7 @@ static int pass_on(jl_par *par, int len, int last)
 static int accept_meas(jl_par *par, jl_meas *meas, int len)
 {
     int m = par->imm->m;
+    jl_real most = par->imm->gate > 0 ? JL_REAL_MAX : JL_LARGE;
     int status = jli_msg_meas_read(meas, par->z, m, JLI_IN(par), len);
 
     if (status != JL_OK)
@@ -112,7 +113,7 @@ static int accept_meas(jl_par *par, jl_meas *meas, int len)
     if (par->steps > 0 && meas->seq <= par->seq)
         return JL_EMSG;
     if (!jli_finite(meas->dt)
-        || (meas->z != NULL && !jl_vec_within(par->z, m, JL_LARGE)))
+        || (meas->z != NULL && !jl_vec_within(par->z, m, most)))
         return JL_ENONFINITE;
     return meas->dt < 0 ? JL_ETIME : JL_OK;
 }

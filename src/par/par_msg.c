@@ -122,7 +122,7 @@ static unsigned status_word(const jl_par *par, int j)
 static void read_status(jl_par *par, int j, unsigned word)
 {
     par->status[j] = -(int)(word & ~OUTSIDE);
-    par->imm->nis[j] = word & OUTSIDE ? JL_REAL_MAX : 0;
+    par->imm->nis[j] = word & OUTSIDE ? -jl_log(0) : 0; /* above any gate */
 }
 
 /* The own pool has a place of its own, for the own modes are still needed. */
@@ -202,8 +202,10 @@ int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
 int jli_msg_estimate(unsigned char *buf, const jl_imm *imm, jl_u32 seq,
                      int status)
 {
-    unsigned char *p = buf + jli_msg_plain(buf, JLI_ESTIMATE, 0, -status, seq);
+    unsigned char *p = buf;
 
+    p += jli_msg_plain(buf, JLI_ESTIMATE, status == JL_OK ? imm->verdict : 0,
+                       -status, seq);
     if (status == JL_OK) {
         p = jl_put_reals(p, &imm->loglik, 1);
         p = jl_put_reals(p, imm->xhat, imm->n);
@@ -220,14 +222,16 @@ int jli_msg_estimate_read(jl_estimate *estimate, int M, int n,
 
     if (len < JLI_MSG_HEADER)
         return JL_ELENGTH;
-    if (buf[0] != JLI_ESTIMATE || buf[1] != 0)
-        return JL_EMSG;
     status = -(int)jl_get_u16(buf + 2);
+    if (buf[0] != JLI_ESTIMATE
+        || buf[1] > (status == JL_OK ? JL_REJECTED : 0))
+        return JL_EMSG;
     if (len != JLI_MSG_HEADER + (status != JL_OK ? 0 : 1 + n + JL_PACKED(n)
                                  + M) * JL_REAL_OCTETS)
         return JL_ELENGTH;
     estimate->seq = jl_get_u32(buf + 4);
     estimate->status = status;
+    estimate->verdict = buf[1];
     if (status == JL_OK) {
         buf = jl_get_reals(buf + JLI_MSG_HEADER, &estimate->loglik, 1);
         buf = jl_get_reals(buf, estimate->x, n);

@@ -8,7 +8,7 @@
  *     MEAS       first  m; 0: lost  seq          dt, z [m]
  *     MODES      pe     count       seq          status (16 bits) [count],
  *                                                l [count], (x, P packed)
- *     ESTIMATE   -      -status     seq          loglik, x, P packed, mu [M];
+ *     ESTIMATE   verdict -status    seq          loglik, x, P packed, mu [M];
  *                                                nothing if status is not 0
  *     STOP       -      -           -
  *     FAULT      culprit  -status   -
@@ -18,7 +18,8 @@
  * modes of the PEs whose blocks the hop carries; (x, P) follow of each mode, or,
  * in an all-reduce, the pool of each PE, at the place of its first mode; P as
  * the form keeps it, covariance or factor.  Bit 15 of a status says that the
- * measurement is outside the mode's gate, and (x, P) predicted only.  FAULT
+ * measurement is outside the mode's gate: then, and if the mode is impossible,
+ * (x, P) are predicted only.  The verdict is 0 if the status is not.  FAULT
  * names the PE (npe: the host) that cannot be gone on with.
  */
 #ifndef JL_PAR_MSG_H

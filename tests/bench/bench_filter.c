@@ -68,7 +68,7 @@ static struct bank *bank_new(int M, enum bench_kind kind)
     bank->scratch = bank->mu + M;
     state = bank->scratch + JL_IMM_SCRATCH(M, N, AXES);
     for (j = 0; j < M; j++, p += size) {
-        jl_motion motion = { JL_MOTION_CV, AXES, 2, 0, 0, 20 };
+        jl_motion motion = { JL_MOTION_CV, AXES, 2, 0, 0, 20, 0 };
 
         motion.accel_std = JL_C(0.2) * (jl_real)(j + 1);
         bench_must(jl_mode_init(&bank->modes[j], N, AXES, AXES, p, size)

@@ -45,7 +45,8 @@ sim              * lcm/lcm.h jansson.h
 tests            * lcm/lcm.h jansson.h cmocka.h
 '
 
-find include src port sim tests -name '*.[ch]' | sort |
+# .inc, .def: included, and more than once, with other definitions.
+find include src port sim tests -name '*.[ch]' -o -name '*.inc' -o -name '*.def' | sort |
 TOPICS=$topics FOLDERS=$folders SYSTEM=$system awk '
 function complain(text) { print at ": " text; bad++ }
 
@@ -136,7 +137,7 @@ function check(line, from,    name, to, list, h) {
                 list = ""
         if (!index(list, " * "))
             complain("may not include <" name ">")
-    } else if (from != "include/jumplink/config.h")
+    } else if (name !~ /^JL_(CONFIG|KF_SIZES)_FILE$/)
         complain("includes what only the preprocessor knows")
 }
 

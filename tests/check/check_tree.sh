@@ -10,7 +10,7 @@ complain() { echo "$*"; bad=1; }
 planned='Makefile README.md LICENSE include src port tests sim'
 topics='base mat rng model kf imm cgimm mekf systolic pf dropout chan wire link plan par'
 ports='README.md skel loop threads lcm mpi qemu uart'
-tests='README.md close.h unit golden conform program fault fuzz firmware bench check'
+tests='README.md close.h unit golden conform program fault fuzz examples firmware bench check'
 
 # listed FOLDER NAME...: the folder holds nothing else.
 listed() {
@@ -24,7 +24,7 @@ listed() {
 listed . "$planned ${ignored:-build}"
 listed src "$topics"
 listed include 'jumplink.h jumplink'
-listed include/jumplink "config.h names.h $(for t in $topics; do printf '%s.h ' "$t"; done)"
+listed include/jumplink "config.h names.h kf_sizes.def $(for t in $topics; do printf '%s.h ' "$t"; done)"
 listed port "$ports"
 listed tests "$tests"
 

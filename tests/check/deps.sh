@@ -13,6 +13,8 @@ sim       gnuplot-nox                gnuplot
 test      libcmocka-dev              cmocka.h
 test      nftables                   /usr/sbin/nft
 test      iproute2                   ip
+bench     g++                        g++
+bench     libeigen3-dev              c++:eigen3/Eigen/Dense
 fuzz      clang                      clang
 fuzz      libclang-rt-14-dev         clang:fuzzer
 check     binutils                   objdump
@@ -26,6 +28,7 @@ check     libnewlib-arm-none-eabi    arm:math.h
 there() {
     case $1 in
     arm:*) echo "#include <${1#arm:}>" | arm-none-eabi-gcc -E - ;;
+    c++:*) echo "#include <${1#c++:}>" | g++ -x c++ -E - ;;
     clang:*) echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' |
         clang "-fsanitize=${1#clang:}" -x c - -o /dev/null ;;
     *.h) echo "#include <$1>" | ${CC:-cc} -E - ;;

@@ -13,7 +13,7 @@ static jl_mode modes[M];
 
 static void set_up(int j)
 {
-    jl_motion motion = { JL_MOTION_CV, 2, 2, 1, 0, 20 };
+    jl_motion motion = { JL_MOTION_CV, 2, 2, 1, 0, 20, 0 };
 
     (void)jl_mode_init(&modes[j], N, Z, Z, mode_mem[j],
                        JL_MODE_MEM(N, Z, Z));

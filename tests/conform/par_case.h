@@ -23,6 +23,9 @@ struct par_shape {
     int hangs;                  /* this PE falls asleep ...                 */
     int hangs_at;               /* ... at this measurement; 0: at once; -1:
                                    nobody does                              */
+    int gate;                   /* a gate, and bursts of outliers           */
+    int nonlinear;              /* two of three modes are                   */
+    int sizes;                  /* some modes lack components               */
 };
 
 static const jl_kf_form *const par_forms[] = { &jl_kf_joseph, &jl_kf_standard,
@@ -39,6 +42,8 @@ struct par_bank {
     jl_real scratch[JL_IMM_SCRATCH(PAR_MOST, PAR_N, PAR_Z)];
     jl_real Pi[PAR_MOST * PAR_MOST];
     jl_motion motions[PAR_MOST];
+    jl_nonlinear nonlinear[PAR_MOST];
+    const int *map[PAR_MOST];
     jl_imm imm;
     jl_chan *silent;            /* nothing ever comes here                  */
     int hangs_at;               /* or -1                                    */
@@ -47,6 +52,7 @@ struct par_bank {
 /* What a run gives, step by step. */
 struct par_trace {
     int status[PAR_STEPS];
+    int verdict[PAR_STEPS];
     jl_real x[PAR_STEPS][PAR_N];
     jl_real P[PAR_STEPS][PAR_N * PAR_N];
     jl_real mu[PAR_STEPS][PAR_MOST];
@@ -63,7 +69,7 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
 
     memset(P, 0, sizeof P);
     for (j = 0; j < M; j++) {
-        jl_motion motion = { JL_MOTION_CT, 2, 2, JL_C(0.5), 0, 20 };
+        jl_motion motion = { JL_MOTION_CT, 2, 2, JL_C(0.5), 0, 20, 0 };
 
         motion.turn_rate = JL_C(0.02) * (jl_real)(j - M / 2);
         motion.accel_std = JL_C(0.3) * (jl_real)(j + 1);
@@ -93,6 +99,122 @@ static inline void par_bank_init(struct par_bank *bank, int M, int sticky,
     assert_int_equal(jl_imm_set(&bank->imm, x, P, mu, bank->scratch), 0);
 }
 
+/* A mode of a target that hardly moves: it has no velocities. */
+static inline void par_still(jl_mode *mode, jl_real *mem)
+{
+    static const jl_real F[] = { 1, 0, 0, 1 }, Q[] = { 400, 0, 0, 400 };
+    jl_real scratch[JL_MODE_SCRATCH(PAR_Z, PAR_Z, PAR_Z)];
+
+    assert_int_equal(jl_mode_init(mode, PAR_Z, PAR_Z, PAR_Z, mem,
+                                  JL_MODE_MEM(PAR_Z, PAR_Z, PAR_Z)), 0);
+    assert_int_equal(jl_mode_set(mode, F, F, Q, NULL, F, Q, scratch), 0);
+}
+
+/* Every third mode is like that; one that starts to move does so with 100 m/s
+ * or so.  To be called before there is a gate. */
+static inline void par_bank_sizes(struct par_bank *bank)
+{
+    static const int positions[] = { 0, 2 };
+    static const jl_real mean[PAR_N] = { 0, 100, 0, 50 };
+    static const jl_real var[PAR_N] = { 0, 2500, 0, 900 };
+    jl_real x[PAR_MOST * PAR_N], P[PAR_MOST * PAR_N * PAR_N], mu[PAR_MOST];
+    jl_imm *imm = &bank->imm;
+    int j, M = imm->M;
+
+    memcpy(x, imm->x, (size_t)(M * PAR_N) * sizeof *x);
+    memcpy(mu, imm->mu, (size_t)M * sizeof *mu);
+    for (j = 0; j < M; j++) {
+        jl_imm_cov(imm, j, P + j * PAR_N * PAR_N);
+        bank->map[j] = NULL;
+        if (j % 3 != 1)
+            continue;
+        bank->map[j] = positions;
+        par_still(&bank->modes[j], bank->mode_mem[j]);
+    }
+    assert_int_equal(jl_imm_init_sizes(imm, M, PAR_N, bank->modes, bank->map,
+                                       mean, var, imm->form, JL_MIX_AUTO,
+                                       bank->mem,
+                                       JL_IMM_STATE(PAR_MOST, PAR_N, PAR_Z)),
+                     0);
+    assert_int_equal(jl_imm_chain(imm, bank->Pi), 0);
+    assert_int_equal(jl_imm_set(imm, x, P, mu, bank->scratch), 0);
+}
+
+/* A gate; where that is allowed, nobody enters the last mode. */
+static inline void par_bank_gate(struct par_bank *bank, int sticky)
+{
+    int M = bank->imm.M, i;
+
+    for (i = 0; !sticky && M > 2 && i < M; i++) {
+        jl_real *row = bank->Pi + i * M;
+
+        row[i < M - 1 ? i : 0] += row[M - 1];
+        row[M - 1] = 0;
+    }
+    assert_int_equal(jl_imm_chain(&bank->imm, bank->Pi), 0);
+    assert_int_equal(jl_imm_gate(&bank->imm, JL_C(13.82), JL_GATE_MOST), 0);
+}
+
+/* --- nonlinear modes ------------------------------------------------------ */
+
+/* The faster, the more the velocity turns; context is the mode's motion.
+ * Where the measurements that are absurd have led is no sine, but a code. */
+static inline int par_f(jl_real *y, const jl_real *x, void *context)
+{
+    const jl_motion *motion = context;
+    jl_real s, c, angle = x[1] * x[3] * JL_C(1e-6) + motion->turn_rate;
+    int status = jl_sincos(&s, &c, angle);
+
+    if (status != JL_OK)
+        return status;
+    y[1] = c * x[1] - s * x[3];
+    y[3] = s * x[1] + c * x[3];
+    y[0] = x[0] + (x[1] + y[1]) / 2;
+    y[2] = x[2] + (x[3] + y[3]) / 2;
+    return JL_OK;
+}
+
+static inline int par_h(jl_real *z, const jl_real *x, void *context)
+{
+    jl_real s, c;
+    int status = jl_sincos(&s, &c, x[0] / 1000);
+
+    (void)context;
+    z[0] = x[0] + 30 * s;
+    z[1] = x[2] + 30 * c;
+    return status;
+}
+
+static inline void par_residual(jl_real *d, const jl_real *a,
+                                const jl_real *b, void *context)
+{
+    (void)context;
+    d[0] = a[0] - b[0];
+    d[1] = a[1] - b[1];
+}
+
+static inline void par_bank_bend(struct par_bank *bank)
+{
+    int j;
+
+    for (j = 0; j < bank->imm.M; j++) {
+        jl_nonlinear *how = &bank->nonlinear[j];
+
+        memset(how, 0, sizeof *how);
+        how->h = par_h;
+        how->context = &bank->motions[j];
+        if (j % 3 == 1) {
+            how->f = par_f;
+            how->residual = par_residual;
+            how->kappa = 1;
+        }
+        if (j % 3 > 0)
+            assert_int_equal(jl_mode_nonlinear(&bank->modes[j], how), 0);
+    }
+}
+
+/* --- running it ----------------------------------------------------------- */
+
 /* A model that changes now and then, in a prepare that spoils the scratch. */
 static inline int par_prepare(void *context, jl_imm *imm, const jl_meas *meas)
 {
@@ -105,8 +227,9 @@ static inline int par_prepare(void *context, jl_imm *imm, const jl_meas *meas)
     if (meas->seq % 10 != 0)
         return JL_OK;
     for (j = 0; j < imm->M && status == JL_OK; j++)
-        status = jl_mode_motion(&bank->modes[j], &bank->motions[j],
-                                meas->seq % 20 == 0 ? JL_C(1.25) : 1);
+        if (bank->modes[j].n == PAR_N)
+            status = jl_mode_motion(&bank->modes[j], &bank->motions[j],
+                                    meas->seq % 20 == 0 ? JL_C(1.25) : 1);
     return status == JL_OK ? jl_imm_chain(imm, bank->Pi) : status;
 }
 
@@ -133,13 +256,29 @@ static inline void par_meas(jl_meas *meas, jl_real *z, int k)
     meas->z = k % 7 == 5 ? NULL : z;
 }
 
+/* What a gate is for: outliers in a row that it rejects, a number that cannot
+ * be used, a displacement that it gives in to; and at last numbers so large
+ * that, once it has given in, predictions fail. */
+static inline void par_spoil(jl_real *z, int k)
+{
+    if (k >= 14 && k < 17)
+        z[0] += 3000;
+    if (k == 18)
+        z[1] = -JL_REAL_MAX;
+    if (k >= 30 && k < 40)
+        z[0] += 8000;
+    if (k >= 50)
+        z[0] = z[1] = JL_LARGE;
+}
+
 static inline void par_note(struct par_trace *trace, int k, int status,
-                            const jl_real *x, const jl_real *P,
+                            int verdict, const jl_real *x, const jl_real *P,
                             const jl_real *mu, jl_real loglik, int M)
 {
     trace->status[k] = status;
     if (status != JL_OK)
         return;
+    trace->verdict[k] = verdict;
     memcpy(trace->x[k], x, sizeof trace->x[k]);
     memcpy(trace->P[k], P, sizeof trace->P[k]);
     memcpy(trace->mu[k], mu, (size_t)M * sizeof *mu);
@@ -157,14 +296,22 @@ static inline void par_serial(struct par_trace *trace,
 
     memset(trace, 0, sizeof *trace);
     par_bank_init(&bank, shape->M, shape->sticky, shape->form);
+    if (shape->nonlinear)
+        par_bank_bend(&bank);
     bank.hangs_at = -1;
+    if (shape->sizes)
+        par_bank_sizes(&bank);
+    if (shape->gate)
+        par_bank_gate(&bank, shape->sticky);
     for (k = 0; k < PAR_STEPS; k++) {
         par_meas(&meas, z, k);
+        if (shape->gate)
+            par_spoil(z, k);
         status = par_prepare(&bank, &bank.imm, &meas);
         if (status == JL_OK)
             status = jl_imm_step(&bank.imm, meas.z, bank.scratch);
-        par_note(trace, k, status, bank.imm.xhat, bank.imm.Phat, bank.imm.mu,
-                 bank.imm.loglik, shape->M);
+        par_note(trace, k, status, bank.imm.verdict, bank.imm.xhat,
+                 bank.imm.Phat, bank.imm.mu, bank.imm.loglik, shape->M);
     }
 }
 
@@ -182,6 +329,12 @@ static inline int par_pe(int pe, const struct par_shape *shape, jl_chan **to,
     jl_par par;
 
     par_bank_init(bank, shape->M, shape->sticky, shape->form);
+    if (shape->sizes)
+        par_bank_sizes(bank);
+    if (shape->gate)
+        par_bank_gate(bank, shape->sticky);
+    if (shape->nonlinear)
+        par_bank_bend(bank);
     bank->silent = from[pe];
     bank->hangs_at = shape->hangs == pe ? shape->hangs_at : -1;
     if (bank->hangs_at == 0)
@@ -231,6 +384,8 @@ static inline int par_host(struct par_trace *trace,
                            60000000);
     for (k = 0; k < PAR_STEPS && status == JL_OK; k++) {
         par_meas(&meas, z, k);
+        if (shape->gate)
+            par_spoil(z, k);
         status = jl_host_send(to, &meas, PAR_Z, buf, sizeof buf, 5000000);
         if (status == JL_OK)
             status = jl_host_recv(from, &estimate, shape->M, PAR_N, buf,
@@ -238,8 +393,8 @@ static inline int par_host(struct par_trace *trace,
         if (status == JL_OK && estimate.seq != meas.seq)
             status = JL_EMSG;
         if (status == JL_OK)
-            par_note(trace, k, estimate.status, x, P, mu, estimate.loglik,
-                     shape->M);
+            par_note(trace, k, estimate.status, estimate.verdict, x, P, mu,
+                     estimate.loglik, shape->M);
     }
     if (blamed != NULL)
         *blamed = estimate.failed_pe;

@@ -192,7 +192,8 @@ static void test_conform_skel_lossy(void **state)
 
 static struct par_trace trace;
 static const struct par_shape shape = {
-    NODES - 1, PAR_M, 0, &jl_kf_joseph, JL_TOPO_RING, JL_EXCHANGE_GATHER, -1, -1
+    .npe = NODES - 1, .M = PAR_M, .form = &jl_kf_joseph,
+    .topology = JL_TOPO_RING, .hangs = -1, .hangs_at = -1
 };
 
 static void filter(int node)

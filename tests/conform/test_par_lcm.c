@@ -84,11 +84,11 @@ static void compare(const struct par_shape *shape)
     assert_same_bits(&trace, &serial, sizeof serial);
 }
 
-static void test_par_gives_serial_bits_over_lcm_and_topologies(void **state)
+static void compare_all(int gate)
 {
-    struct par_shape s = { 0, PAR_M, 0, &jl_kf_joseph, 0, 0, 0, -1 };
+    struct par_shape s = { .M = PAR_M, .form = &jl_kf_joseph,
+                           .hangs_at = -1, .gate = gate };
 
-    (void)state;
     if (!is_private)
         skip();
     for (s.topology = JL_TOPO_FULL; s.topology <= JL_TOPO_CHAIN;
@@ -100,10 +100,23 @@ static void test_par_gives_serial_bits_over_lcm_and_topologies(void **state)
         }
 }
 
+static void test_par_gives_serial_bits_over_lcm_and_topologies(void **state)
+{
+    (void)state;
+    compare_all(0);
+}
+
+static void test_par_gate_gives_serial_bits_over_lcm(void **state)
+{
+    (void)state;
+    compare_all(1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_over_lcm_and_topologies),
+        cmocka_unit_test(test_par_gate_gives_serial_bits_over_lcm),
     };
 
     is_private = private_net_enter() == 0;

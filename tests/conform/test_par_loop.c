@@ -41,7 +41,7 @@ static void start(struct run *run, int slots)
 {
     /* the last node does nothing but never send, for a PE to sleep on */
     run->loop = jl_loop_new(run->shape.npe + 2,
-                            JL_PAR_MSG(PAR_MOST, PAR_N, PAR_Z), slots);
+                            JL_PAR_MSG(run->shape.M, PAR_N, PAR_Z), slots);
     assert_non_null(run->loop);
     assert_int_equal(jl_loop_run(run->loop, body, run), JL_OK);
     jl_loop_free(run->loop);
@@ -66,7 +66,7 @@ static void compare(struct run *run, int slots)
     parallel(run, slots);
     for (i = 0; i < PAR_STEPS; i++)
         failures += serial.status[i] != JL_OK;
-    if (run->shape.M == PAR_M)
+    if (run->shape.M == PAR_M && !run->shape.sizes)
         assert_true(failures > 0);      /* the comparison covers failed steps */
     assert_same_bits(&run->trace, &serial, sizeof serial);
 }
@@ -96,6 +96,27 @@ static void test_par_gives_serial_bits_for_any_pes_and_topology(void **state)
          s->topology++)
         for (s->npe = 1; s->npe <= 8; s->npe++)
             compare_all(&run);
+}
+
+static void test_par_gives_serial_bits_with_functions(void **state)
+{
+    static const jl_kf_form *const forms[] = {
+        &jl_kf_joseph, &jl_kf_standard, &jl_kf_sqrt, &jl_kf_unscented
+    };
+    static struct run run = { .shape = { .hangs_at = -1, .nonlinear = 1 } };
+    struct par_shape *s = &run.shape;
+    int f;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 1; s->npe <= 5; s->npe++)
+            for (s->sticky = 0; s->sticky < 2; s->sticky++)
+                for (f = 0; f < 4; f++) {
+                    s->form = forms[f];
+                    compare(&run, s->npe % 3);
+                }
 }
 
 static void test_par_gives_serial_bits_on_sixteen_pes(void **state)
@@ -129,6 +150,101 @@ static void test_par_leaves_spare_pes_idle(void **state)
         for (s->M = 1; s->M <= PAR_M; s->M += 2)
             for (slots = 0; slots < 2; slots++)
                 compare(&run, slots);
+}
+
+/* --- the gate ------------------------------------------------------------- */
+
+/* The reference shows what is to be compared: rejections, some after some that
+ * are missing, and measurements accepted after too many of them. */
+static void check_gated(const struct par_shape *shape)
+{
+    static struct par_trace serial;
+    int k, run = 0, rejected = 0, forced = 0;
+
+    par_serial(&serial, shape);
+    for (k = 0; k < PAR_STEPS && serial.status[k] == JL_OK; k++)
+        if (serial.verdict[k] == JL_REJECTED) {
+            run++;
+            rejected++;
+        } else if (serial.verdict[k] == JL_ACCEPTED) {
+            forced += run == JL_GATE_MOST;
+            run = 0;
+        }
+    assert_int_equal(serial.verdict[18], JL_REJECTED);  /* JL_REAL_MAX */
+    assert_true(rejected >= 14);
+    assert_int_equal(forced, 2);
+    assert_int_equal(serial.verdict[33], JL_MISSING);
+}
+
+static void test_par_gate_gives_serial_bits(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .gate = 1 } };
+    struct par_shape *s = &run.shape;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->npe = 1; s->npe <= 8; s->npe++) {
+            compare_all(&run);
+            check_gated(s);
+        }
+}
+
+static void test_par_gate_with_few_modes(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .gate = 1 } };
+    struct par_shape *s = &run.shape;
+
+    (void)state;
+    for (s->M = 1; s->M <= 5; s->M++)
+        for (s->npe = 1; s->npe <= 5; s->npe += 2)
+            compare_all(&run);
+}
+
+/* A PE alone has nothing to reduce. */
+static void test_par_gate_is_not_for_an_all_reduce(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .gate = 1 } };
+    struct par_shape *s = &run.shape;
+    int k;
+
+    (void)state;
+    s->form = &jl_kf_joseph;
+    s->M = PAR_M;
+    s->sticky = 1;
+    s->exchange = JL_EXCHANGE_REDUCE;
+    for (s->npe = 2; s->npe <= 5; s->npe++) {
+        parallel(&run, 1);
+        for (k = 0; k < PAR_STEPS; k++)
+            assert_int_equal(run.trace.status[k], JL_EGATE);
+    }
+    s->npe = 1;
+    compare(&run, 1);
+    assert_int_equal(run.trace.verdict[14], JL_REJECTED);
+}
+
+/* --- modes of different states -------------------------------------------- */
+
+static void test_par_sizes_give_serial_bits(void **state)
+{
+    static const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard,
+                                               &jl_kf_sqrt };
+    static struct run run = { .shape = { .hangs_at = -1, .sizes = 1 } };
+    struct par_shape *s = &run.shape;
+    int f, slots;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->npe = 1; s->npe <= 8; s->npe++)
+        for (f = 0; f < 3; f++)
+            for (s->sticky = 0; s->sticky < 2; s->sticky++)
+                for (s->gate = 0; s->gate < 2; s->gate++)
+                    for (slots = 0; slots <= 1; slots++) {
+                        s->form = forms[f];
+                        s->topology = s->npe % (JL_TOPO_CHAIN + 1);
+                        compare(&run, slots);
+                    }
 }
 
 /* --- the all-reduce ------------------------------------------------------ */
@@ -165,7 +281,7 @@ static void assert_close_trace(const struct par_trace *a,
     }
 }
 
-static void check_reduce(const jl_kf_form *form)
+static void check_reduce(const jl_kf_form *form, int sizes)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
     static struct par_trace serial, full;
@@ -175,6 +291,7 @@ static void check_reduce(const jl_kf_form *form)
     s->form = form;
     s->sticky = 1;
     s->exchange = JL_EXCHANGE_REDUCE;
+    s->sizes = sizes;
     for (s->M = 1; s->M <= PAR_M; s->M += 2)
         for (s->npe = 1; s->npe <= 8; s->npe++) {
             par_serial(&serial, s);
@@ -193,8 +310,15 @@ static void check_reduce(const jl_kf_form *form)
 static void test_par_reduce_equals_serial_up_to_rounding(void **state)
 {
     (void)state;
-    check_reduce(&jl_kf_joseph);
-    check_reduce(&jl_kf_sqrt);
+    check_reduce(&jl_kf_joseph, 0);
+    check_reduce(&jl_kf_sqrt, 0);
+}
+
+static void test_par_sizes_reduce_equals_serial_up_to_rounding(void **state)
+{
+    (void)state;
+    check_reduce(&jl_kf_joseph, 1);
+    check_reduce(&jl_kf_sqrt, 1);
 }
 
 static void test_par_reduce_refuses_a_chain_that_is_not_sticky(void **state)
@@ -247,7 +371,7 @@ static void test_par_blames_the_dead_and_not_the_relay(void **state)
 #define REFUSALS 9
 
 static const struct par_shape one_pe = {
-    1, 3, 1, &jl_kf_joseph, JL_TOPO_FULL, JL_EXCHANGE_GATHER, 0, -1
+    .npe = 1, .M = 3, .sticky = 1, .form = &jl_kf_joseph, .hangs_at = -1
 };
 
 struct refusal {
@@ -340,7 +464,7 @@ static void test_par_refuses_bad_measurements_with_a_code(void **state)
 /* --- a PE1 that says what does not belong here --------------------------- */
 
 static const struct par_shape two_pes = {
-    2, 3, 1, &jl_kf_joseph, JL_TOPO_FULL, JL_EXCHANGE_GATHER, 0, -1
+    .npe = 2, .M = 3, .sticky = 1, .form = &jl_kf_joseph, .hangs_at = -1
 };
 
 #define MODES_LEN (8 + 2 + (1 + PAR_N + JL_PACKED(PAR_N)) * JL_REAL_OCTETS)
@@ -497,9 +621,15 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_for_any_pes_and_topology),
+        cmocka_unit_test(test_par_gives_serial_bits_with_functions),
         cmocka_unit_test(test_par_gives_serial_bits_on_sixteen_pes),
         cmocka_unit_test(test_par_leaves_spare_pes_idle),
+        cmocka_unit_test(test_par_gate_gives_serial_bits),
+        cmocka_unit_test(test_par_gate_with_few_modes),
+        cmocka_unit_test(test_par_gate_is_not_for_an_all_reduce),
+        cmocka_unit_test(test_par_sizes_give_serial_bits),
         cmocka_unit_test(test_par_reduce_equals_serial_up_to_rounding),
+        cmocka_unit_test(test_par_sizes_reduce_equals_serial_up_to_rounding),
         cmocka_unit_test(test_par_reduce_refuses_a_chain_that_is_not_sticky),
         cmocka_unit_test(test_par_blames_the_dead_and_not_the_relay),
         cmocka_unit_test(test_par_refuses_bad_measurements_with_a_code),

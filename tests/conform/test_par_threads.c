@@ -43,14 +43,14 @@ static void compare(struct run *run, int slots)
     assert_same_bits(&run->trace, &serial, sizeof serial);
 }
 
-static void test_par_gives_serial_bits_on_threads(void **state)
+static void compare_all(int gate)
 {
     static struct run run = { .shape = { .hangs_at = -1 } };
     struct par_shape *s = &run.shape;
     int slots, f;
 
-    (void)state;
     s->M = PAR_M;
+    s->gate = gate;
     for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
          s->topology++)
         for (s->npe = 1; s->npe <= 8; s->npe++)
@@ -62,10 +62,38 @@ static void test_par_gives_serial_bits_on_threads(void **state)
                     }
 }
 
+static void test_par_gives_serial_bits_on_threads(void **state)
+{
+    (void)state;
+    compare_all(0);
+}
+
+static void test_par_gate_gives_serial_bits_on_threads(void **state)
+{
+    (void)state;
+    compare_all(1);
+}
+
+static void test_par_gives_serial_bits_with_functions(void **state)
+{
+    static struct run run = { .shape = { .hangs_at = -1, .nonlinear = 1 } };
+    struct par_shape *s = &run.shape;
+
+    (void)state;
+    s->M = PAR_M;
+    for (s->npe = 1; s->npe <= 8; s->npe++) {
+        s->form = s->npe % 2 ? &jl_kf_unscented : &jl_kf_joseph;
+        compare(&run, 1);
+        s->sticky = !s->sticky;
+    }
+}
+
 int main(void)
 {
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_on_threads),
+        cmocka_unit_test(test_par_gate_gives_serial_bits_on_threads),
+        cmocka_unit_test(test_par_gives_serial_bits_with_functions),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

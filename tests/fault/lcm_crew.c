@@ -149,8 +149,8 @@ void crew_leave(jl_lcm *lcm, struct crew_node *node, int failed)
 
 static struct par_shape shape_of(int sticky)
 {
-    struct par_shape shape = { CREW_PES, PAR_M, 0, &jl_kf_joseph,
-                               JL_TOPO_FULL, 0, 0, -1 };
+    struct par_shape shape = { .npe = CREW_PES, .M = PAR_M,
+                               .form = &jl_kf_joseph, .hangs_at = -1 };
 
     shape.sticky = sticky;
     return shape;

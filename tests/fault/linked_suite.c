@@ -208,7 +208,7 @@ void linked_suite_gives_serial_bits(const linked_port *over)
 {
     static struct par_trace serial[2];
     static const struct par_shape shape = {
-        PAR_PES, PAR_M, 0, &jl_kf_joseph, JL_TOPO_FULL, 0, 0, -1
+        .npe = PAR_PES, .M = PAR_M, .form = &jl_kf_joseph, .hangs_at = -1
     };
     static struct filter filter;
     int *sticky = &filter.shape.sticky, s;

@@ -7,7 +7,7 @@
  * received; a message of another length, or with another header, is refused.
  * If nothing was altered, the host gets the serial filter's bits (an all-reduce
  * has its own, which are not compared), and for what is refused the code that
- * par.h promises. */
+ * par.h promises.  Some games have a gate. */
 #include "fuzz.h"
 
 #include <stdlib.h>
@@ -43,7 +43,7 @@ struct bent {
 struct game {
     fuzz_script script;
     jl_loop *loop;
-    int npe, topology, exchange;
+    int npe, topology, exchange, gate;
     struct bent from[NODES][NODES];     /* [receiver][sender]               */
     struct bank bank[NODES];            /* the host's is the serial filter  */
     jl_u32 last_seq[NODES];
@@ -84,7 +84,8 @@ static int alter(struct game *g, const struct bent *b, unsigned char *msg,
         at = (at < 128 ? at : at % 8) % (unsigned)len;
         octet = (unsigned char)fuzz_octet(&g->script);
         msg[at] ^= octet;
-        if (at < 8 && octet != 0)
+        if (at < 8 && octet != 0        /* unless it is another verdict */
+            && !(b->to == g->npe && at == 1 && msg[1] <= JL_REJECTED))
             spoil(g, b, 1);
         return len;
     case 2:
@@ -156,7 +157,7 @@ static const jl_chan_ops bent_ops = { bent_send, bent_recv, bent_wait };
 
 /* --- the filter ---------------------------------------------------------- */
 
-static void bank_init(struct bank *bank, int sticky)
+static void bank_init(struct bank *bank, int sticky, int gate)
 {
     static const jl_real mu[M] = { 0.5, 0.25, 0.25 };
     static const jl_real alike[M * M] = {
@@ -166,7 +167,7 @@ static void bank_init(struct bank *bank, int sticky)
         JL_C(0.9), JL_C(0.05), JL_C(0.05), JL_C(0.1), JL_C(0.8), JL_C(0.1),
         JL_C(0.2), JL_C(0.1), JL_C(0.7)
     };
-    jl_motion motion = { JL_MOTION_CV, Z, N, 0, 0, 2 };
+    jl_motion motion = { JL_MOTION_CV, Z, N, 0, 0, 2, 0 };
     jl_real x[M * N], P[M * N * N], zero = 0;
     int j;
 
@@ -183,11 +184,13 @@ static void bank_init(struct bank *bank, int sticky)
                JL_OK);
     FUZZ_HOLDS(jl_imm_chain(&bank->imm, sticky ? alike : other) == JL_OK);
     FUZZ_HOLDS(jl_imm_set(&bank->imm, x, P, mu, bank->scratch) == JL_OK);
+    if (gate)
+        FUZZ_HOLDS(jl_imm_gate(&bank->imm, JL_C(10.83), 2) == JL_OK);
 }
 
-static int within(jl_real v)
+static int within(jl_real v, jl_real limit)
 {
-    return v >= -JL_LARGE && v <= JL_LARGE;
+    return v >= -limit && v <= limit;
 }
 
 /* What par.h promises of a measurement: JL_OK, or why it is refused. */
@@ -196,7 +199,8 @@ static int usable(const struct game *g, int node, const jl_meas *meas)
     if (g->started[node] && meas->seq <= g->last_seq[node])
         return JL_EMSG;
     if (!(meas->dt - meas->dt == 0) ||
-        (meas->z != NULL && !within(meas->z[0])))
+        (meas->z != NULL && !within(meas->z[0], g->gate ? JL_REAL_MAX
+                                                         : JL_LARGE)))
         return JL_ENONFINITE;
     return meas->dt < 0 ? JL_ETIME : JL_OK;
 }
@@ -256,7 +260,7 @@ static void be_pe(struct game *g, int pe, jl_chan **to, jl_chan **from)
 
     context.game = g;
     context.pe = pe;
-    bank_init(&g->bank[pe], g->exchange == JL_EXCHANGE_REDUCE);
+    bank_init(&g->bank[pe], g->exchange == JL_EXCHANGE_REDUCE, g->gate);
     jl_par_deal(owner, M, g->npe);
     memset(&config, 0, sizeof config);
     config.pe = pe;
@@ -315,6 +319,7 @@ static void check_octets(const jl_estimate *e, const struct bent *from)
 
     memset(octets, 0, 8);
     octets[0] = 4;
+    octets[1] = (unsigned char)e->verdict;
     jl_put_u16(octets + 2, (unsigned)-e->status);
     jl_put_u32(octets + 4, e->seq);
     if (e->status == JL_OK) {
@@ -342,6 +347,7 @@ static void check_answer(struct game *g, const jl_meas *meas, int m,
     }
     FUZZ_HOLDS(e->seq == meas->seq);
     FUZZ_HOLDS(e->status == status);
+    FUZZ_HOLDS(e->verdict == (status == JL_OK ? imm->verdict : 0));
     if (status != JL_OK)
         return;
     FUZZ_HOLDS(memcmp(e->x, imm->xhat, N * sizeof *e->x) == 0);
@@ -363,7 +369,7 @@ static void be_host(struct game *g, jl_chan *to, jl_chan *from)
     estimate.x = x;
     estimate.P = P;
     estimate.mu = mu;
-    bank_init(&g->bank[g->npe], 0);
+    bank_init(&g->bank[g->npe], 0, g->gate);
     status = jl_host_ready(from, 7, &estimate.failed_pe, buf, sizeof buf,
                            WAIT_US);
     g->begun = 1;
@@ -427,6 +433,7 @@ int fuzz_par(const unsigned char *data, size_t size)
     g.npe = 1 + (int)(first % PES);
     g.topology = (int)(first >> 2 & 3);
     g.exchange = first >> 7 ? JL_EXCHANGE_REDUCE : JL_EXCHANGE_GATHER;
+    g.gate = (first >> 4 & 7) > 5;
     g.loop = jl_loop_new(g.npe + 1, LONGEST, (int)(first >> 4 & 7) % 3);
     FUZZ_HOLDS(g.loop != NULL);
     FUZZ_HOLDS(jl_loop_run(g.loop, be_node, &g) == JL_OK);

@@ -1,25 +1,11 @@
 /* The IMM against 60-digit references: every case, form and mixing, in the
- * metric and the tolerances of the cases' makers: x in units of sigma =
- * sqrt(P_aa), floored at 1e-6 of its median over time, P_ab by sigma_a sigma_b,
- * mu absolute, loglik by 1 + |loglik|. */
-#include "close.h"
-
-#include <stdlib.h>
+ * metric and the tolerances of the cases' makers. */
+#include "metric.h"
 
 #include "jumplink.h"
 
-struct imm_case {
-    const char *name;
-    int M, n, m, p, rows;
-    const double *F, *G, *Q, *H, *R, *w_bar, *x0, *P0, *Pi, *mu0, *z;
-    const double *expected;             /* rows of x, P packed, mu, loglik */
-};
-
-#include "imm_cases.h"
-
 #define N 8
 #define MODES 12
-#define ROWS 2048
 
 struct tolerance {
     double x, P, mu, loglik;
@@ -66,29 +52,6 @@ static const struct tolerance *tolerance_of(const struct imm_case *c,
     return &ordinary;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-
-    return (x > y) - (x < y);
-}
-
-/* sigma [rows,n] of a case, floored. */
-static void sigmas(double *sigma, const struct imm_case *c)
-{
-    static double sorted[ROWS];
-    int width = c->n + JL_PACKED(c->n) + c->M + 1, a, k, at = c->n;
-
-    for (a = 0; a < c->n; at += c->n - a, a++) {
-        for (k = 0; k < c->rows; k++)
-            sorted[k] = sigma[k * c->n + a] = sqrt(c->expected[k * width + at]);
-        qsort(sorted, (size_t)c->rows, sizeof *sorted, ascending);
-        for (k = 0; k < c->rows; k++)
-            if (sigma[k * c->n + a] < 1e-6 * sorted[c->rows / 2])
-                sigma[k * c->n + a] = 1e-6 * sorted[c->rows / 2];
-    }
-}
-
 static void check_row(const struct imm_case *c, const struct tolerance *t,
                       const double *want, const double *sigma,
                       const jl_imm *imm)
@@ -128,9 +91,9 @@ static void run(const struct imm_case *c, const jl_kf_form *form, int mixing,
     jl_mode modes[MODES];
     jl_imm imm;
     int j, k, n = c->n, m = c->m, p = c->p, M = c->M;
-    int width = n + JL_PACKED(n) + M + 1;
+    int width = metric_width(c);
 
-    assert_true(M <= MODES && n <= N && c->rows <= ROWS);
+    assert_true(M <= MODES && n <= N);
     for (j = 0; j < M; j++) {
         assert_int_equal(jl_mode_init(&modes[j], n, m, p, mode_mem[j],
                                       JL_MODE_MEM(N, N, N)), JL_OK);
@@ -149,7 +112,7 @@ static void run(const struct imm_case *c, const jl_kf_form *form, int mixing,
     assert_int_equal(jl_imm_set(&imm, real(big[0], c->x0, M * n),
                                 real(big[1], c->P0, M * n * n),
                                 real(big[2], c->mu0, M), scratch), JL_OK);
-    sigmas(sigma, c);
+    metric_sigmas(sigma, c);
     for (k = 0; k < c->rows; k++) {
         assert_int_equal(jl_imm_step(&imm, real(row[6], c->z + k * m, m),
                                      scratch), JL_OK);

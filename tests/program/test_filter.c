@@ -346,6 +346,30 @@ static void test_filter_parallel_irregular_times(void **state)
     free(all);
 }
 
+/* Modes of the catalogue with different numbers of noises. */
+static void test_filter_parallel_singer(void **state)
+{
+    const char *model = scratch_write("singer.json",
+        "{ \"kind\": \"imm\", \"axes\": 2, \"order\": 3, \"sigma_z\": 20,\n"
+        "  \"sojourn_s\": [40, 20, 10], \"modes\": [\n"
+        "  {\"type\": \"singer\", \"accel_std\": 3, \"tau_s\": 8},\n"
+        "  {\"type\": \"cv\", \"accel_std\": 0.3},\n"
+        "  {\"type\": \"ca\", \"accel_std\": 1} ] }\n");
+    const char *data = program_head("glide.csv", DATA "glider_irregular.csv",
+                                    301);
+    char *serial = filtered(model, data, FLIGHT);
+    char *one = filtered(model, data, FLIGHT, "--filter", "kf", "--mode", "0");
+
+    (void)state;
+    same_on("loop", "2", serial, model, data, FLIGHT);
+    same_on("threads", "3", serial, model, data, FLIGHT);
+    same_on("lcm", "2", serial, model, data, FLIGHT);
+    same_on("loop", "2", one, model, data, FLIGHT, "--filter", "kf", "--mode",
+            "0");
+    free(serial);
+    free(one);
+}
+
 static void test_filter_parallel_held_positions(void **state)
 {
     const char *data = program_head("held.csv", DATA "carrier_held_1hz.csv",
@@ -891,14 +915,16 @@ static void test_help_names_every_option(void **state)
     } helps[] = {
         { NULL, "sim filter host pe --help --version" },
         { "sim", "--data --model --out -o --pes --port --filter --mode --form "
-                 "--hold --z --time --timeout --lcm-url --run --input --idle" },
+                 "--gate --gate-most --hold --z --time --timeout --lcm-url "
+                 "--run --input --idle" },
         { "filter", "MODEL.json DATA.csv --out -o --filter --mode --form "
-                    "--hold --z --time --port --pes --timeout --lcm-url "
-                    "--run" },
-        { "host", "MODEL.json DATA.csv --out -o --filter --mode --form --hold "
-                  "--z --time --pes --run --timeout --start --lcm-url" },
+                    "--gate --gate-most --diagnostics --truth --hold --z "
+                    "--time --port --pes --timeout --lcm-url --run" },
+        { "host", "MODEL.json DATA.csv --out -o --filter --mode --form "
+                  "--gate --gate-most --hold --z --time --pes --run --timeout "
+                  "--start --lcm-url" },
         { "pe", "--pe --pes --model --run --timeout --start --lcm-url "
-                "--filter --mode --form" },
+                "--filter --mode --form --gate --gate-most" },
     };
     size_t i;
 
@@ -924,6 +950,7 @@ int main(void)
         cmocka_unit_test(test_filter_parallel_general_chain),
         cmocka_unit_test(test_filter_parallel_kf),
         cmocka_unit_test(test_filter_parallel_irregular_times),
+        cmocka_unit_test(test_filter_parallel_singer),
         cmocka_unit_test(test_filter_parallel_held_positions),
         cmocka_unit_test(test_filter_parallel_default_pes),
         cmocka_unit_test(test_filter_runs_are_filtered_on_their_own),

@@ -170,6 +170,31 @@ static void test_live_counts_everything_over_loop(void **state)
     check_everything_is_counted("loop");
 }
 
+/* An outlier in the midst. */
+static void test_live_gate(void **state)
+{
+    static const double off[4] = { 1e5, -1e5, 0, 0 };
+    struct program *p;
+    int k;
+
+    (void)state;
+    needs_own_net();
+    p = live_start(JUMPLINK, "sim", "--input", "lcm", "--model", two,
+                   "--lcm-url", LIVE_URL, "--run", "gate", "--pes", "2",
+                   "--port", "loop", "--idle", "2", "-o", folder, "--gate",
+                   "0.9999");
+    live_await_words(p, "listening to ");
+    for (k = 1; k <= 8; k++)
+        if (k == 5)
+            send_z("gate", k, k, 0, off, 2);
+        else
+            send("gate", k, k, 0);
+    live_end(p);
+    check_counts(p, 8, 0, 0, 0);
+    assert_int_equal(live_count_of(p, "rejected"), 1);
+    program_free(p);
+}
+
 /* A record starts at a measurement: what did not arrive before it is a row
  * without estimate and without answer. */
 static void test_live_starts_at_the_first_that_arrived(void **state)
@@ -573,6 +598,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         live_test(test_live_counts_everything_over_lcm),
         live_test(test_live_counts_everything_over_loop),
+        live_test(test_live_gate),
         live_test(test_live_starts_at_the_first_that_arrived),
         live_test(test_live_fills_a_long_gap),
         live_test(test_live_runs_do_not_mix),

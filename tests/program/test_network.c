@@ -166,7 +166,7 @@ static void free_three(struct program *p)
     check_nobody_left();
 }
 
-#define DIFFERENT "different models, filters, forms or topologies"
+#define DIFFERENT "different models, filters, forms, gates or topologies"
 
 /* A host and two PEs of which the second has other arguments: all refuse. */
 static void check_mismatch_told(const char *const *told)
@@ -194,6 +194,42 @@ static void test_network_different_pes_are_refused(void **state)
     check_mismatch("--model", eight);
     check_mismatch("--model", two, "--form", "standard");
     check_mismatch("--model", two, "--filter", "kf", "--mode", "1");
+    check_mismatch("--model", two, "--gate", "0.99999");
+}
+
+/* A gate is given to each of them. */
+static void test_network_by_hand_with_a_gate(void **state)
+{
+    struct program host, pe[2];
+    char *want;
+    int i;
+
+    (void)state;
+    needs_own_net();
+    run_jumplink("filter", two, data, FLIGHT, "--gate", "0.99", "--gate-most",
+                 "2");
+    assert_int_equal(ran.status, 0);
+    assert_non_null(strstr(ran.err, ": the gate rejected "));
+    want = ran.out;
+    ran.out = NULL;
+    for (i = 0; i < 2; i++)
+        program_start(&pe[i], "pe", "--pe", i == 0 ? "0" : "1", "--model", two,
+                      BY_HAND, "--gate", "0.99", "--gate-most", "2");
+    program_start(&host, "host", two, data, FLIGHT, BY_HAND, "--gate", "0.99",
+                  "--gate-most", "2");
+    program_end(&host, PROGRAM_LIMIT);
+    for (i = 0; i < 2; i++) {
+        program_end(&pe[i], PROGRAM_LIMIT);
+        check_pe_left(&pe[i], (char)('0' + i));
+        program_free(&pe[i]);
+    }
+    assert_int_equal(host.status, 0);
+    check_same_text(host.out, want);
+    check_same_text(host.err, ran.err);
+    assert_true(strcmp(want, serial) != 0);
+    program_free(&host);
+    free(want);
+    check_nobody_left();
 }
 
 /* The host has another model than both PEs. */
@@ -454,6 +490,7 @@ int main(void)
         cmocka_unit_test(test_network_two_runs_at_once),
         cmocka_unit_test(test_network_waits_for_the_others),
         cmocka_unit_test(test_network_different_pes_are_refused),
+        cmocka_unit_test(test_network_by_hand_with_a_gate),
         cmocka_unit_test(test_network_host_with_another_model),
         cmocka_unit_test(test_network_pe_with_another_type_of_number),
         cmocka_unit_test(test_network_missing_pe),

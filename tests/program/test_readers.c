@@ -558,11 +558,13 @@ static void test_model_mistakes_of_numbers(void **state)
     bad_edits(matrices, edits);
 }
 
-/* A deviation that fits, with a square that does not. */
+/* Deviations that fit, with squares that do not. */
 #if JL_REAL_FLOAT
 #define HUGE_STD "1e10"
+#define TINY_STD "1e-25"
 #else
 #define HUGE_STD "1e80"
+#define TINY_STD "1e-200"
 #endif
 
 static void test_model_mistakes_of_the_catalogue(void **state)
@@ -575,22 +577,40 @@ static void test_model_mistakes_of_the_catalogue(void **state)
         { "\"order\": 3", "\"order\": 4", "json: order: ", "2 to 3, is 4" },
         { "\"order\": 3", "\"order\": 2", "modes[1].type: ",
           "ca needs order 3" },
+        { "\"cv\"", "\"cv\", \"order\": 1", "modes[0].order: ",
+          "2 to 3, is 1" },
+        { "\"cv\"", "\"cv\", \"order\": 4", "modes[0].order: ",
+          "2 to 3, is 4" },
+        { "\"cv\"", "\"cv\", \"order\": \"2\"", "modes[0].order: ",
+          "whole number" },
+        { "\"ca\"", "\"ca\", \"order\": 2", "modes[1].type: ",
+          "ca needs order 3" },
         { "\"sigma_z\": 20.0,", "", "json: sigma_z: ", "missing" },
         { "20.0", "0", "json: sigma_z: ", "above 0" },
         { "20.0", HUGE_STD, "json: modes[0]: ", "not finite or too large" },
         { "20.0", "20, \"v0_std\": 0", "json: v0_std: ", "above 0" },
         { "20.0", "20, \"a0_std\": -1", "json: a0_std: ", "above 0" },
         { "20.0", "20, \"n\": 4", "json: n: ", "unknown key" },
-        { "\"cv\"", "\"cw\"", "modes[0].type: ", "'cw' is not cv, ca or ct" },
-        { "\"cv\"", "\"singer\"", "modes[0].type: ",
-          "'singer' is not supported by this version" },
+        { "\"cv\"", "\"cw\"", "modes[0].type: ", "'cw' is not cv, ca, ct or singer" },
         { "\"type\": \"ca\", ", "", "modes[1].type: ", "missing" },
         { "0.5}", "-0.5}", "modes[0].accel_std: ", "not negative" },
         { "0.5}", "\"0.5\"}", "modes[0].accel_std: ", "must be a number" },
         { "0.5}", "0.5, \"turn_rate\": 1}", "modes[0].turn_rate: ",
           "unknown key" },
         { "\"turn_rate\": -0.25,", "", "modes[2].turn_rate: ", "missing" },
-        { "-0.25", "1025", "json: modes[2]: ", "domain" },
+        { "\"ca\"", "\"singer\"", "modes[1].tau_s: ", "missing" },
+        { "\"ca\"", "\"singer\", \"tau_s\": 0", "modes[1].tau_s: ",
+          "0: must be above 0" },
+        { "\"ca\"", "\"singer\", \"tau_s\": -3", "modes[1].tau_s: ",
+          "-3: must be above 0" },
+        { "\"ca\"", "\"singer\", \"tau_s\": \"3\"", "modes[1].tau_s: ",
+          "must be a number" },
+        { "\"ca\"", "\"singer\", \"tau_s\": " HUGE_STD, "json: modes[1]: ",
+          "not finite or too large" },
+        { "\"ca\"", "\"singer\", \"tau_s\": 3, \"turn_rate\": 1",
+          "modes[1].turn_rate: ", "unknown key" },
+        { "\"ca\"", "\"ca\", \"tau_s\": 3", "modes[1].tau_s: ",
+          "unknown key" },
         { "[60, 10, 20]", "[60, 10]", "json: sojourn_s: ",
           "3 numbers, has 2" },
         { "[60, 10, 20]", "[60, 0, 20]", "json: sojourn_s[1]: ", "above 0" },
@@ -605,6 +625,98 @@ static void test_model_mistakes_of_the_catalogue(void **state)
 
     (void)state;
     bad_edits(catalogue, edits);
+}
+
+/* A catalogue's mode with more noises than others: order, sizes, numbers. */
+static void test_model_takes_singer(void **state)
+{
+    static const char text[] =
+        "{ \"kind\": \"imm\", \"axes\": 2, \"order\": 3, "
+        "\"sigma_z\": 20.0,\n"
+        "  \"sojourn_s\": [60, 10, 20],\n"
+        "  \"modes\": [ {\"type\": \"singer\", \"tau_s\": 12.5, "
+        "\"accel_std\": 0.5},\n"
+        "    {\"type\": \"cv\", \"accel_std\": 4},\n"
+        "    {\"type\": \"singer\", \"accel_std\": 2, \"tau_s\": 3} ] }\n";
+    struct model model;
+
+    (void)state;
+    assert_int_equal(model_read(&model, scratch_write("m.json", text)), 0);
+    assert_int_equal(model.n, 6);
+    assert_int_equal(model.m, 2);
+    assert_int_equal(model.modes[0].p, 6);
+    assert_int_equal(model.modes[1].p, 2);
+    assert_int_equal(model.modes[2].p, 6);
+    assert_int_equal(model.motions[0].kind, JL_MOTION_SINGER);
+    assert_close(model.motions[0].tau_s, 12.5, 0);
+    assert_close(model.motions[0].accel_std, 0.5, 0);
+    assert_close(model.motions[2].tau_s, 3, 0);
+    model_free(&model);
+    bad_model("{ \"kind\": \"imm\", \"axes\": 1, \"order\": 2, "
+              "\"sigma_z\": 1, \"sojourn_s\": [1], \"modes\": "
+              "[ {\"type\": \"singer\", \"tau_s\": 1, \"accel_std\": 1} ] }",
+              "modes[0].type: ", "singer needs order 3");
+}
+
+/* A mode of order 2 in a model of order 3: maps, the prior, starts. */
+static void test_model_takes_mixed_orders(void **state)
+{
+    static const char two_kinds[] =
+        "{ \"kind\": \"imm\", \"axes\": 2, \"order\": 3, \"sigma_z\": 20.0,\n"
+        "  \"a0_std\": 3, \"sojourn_s\": [60, 10, 20], \"modes\": [\n"
+        "    {\"type\": \"cv\", \"order\": 2, \"accel_std\": 0.5,\n"
+        "     \"x0\": [1, 2, 3, 4], \"P0\": [[1,0,0,0], [0,2,0,0.5],\n"
+        "     [0,0,3,0], [0,0.5,0,4]]},\n"
+        "    {\"type\": \"ca\", \"order\": 3, \"accel_std\": 4.0,\n"
+        "     \"x0\": [5,6,7,8,9,10], \"P0\": [[1,0,0,0,0,0], [0,2,0,0,0,0],\n"
+        "     [0,0,3,0,0,0], [0,0,0,4,0,0], [0,0,0,0,5,0], [0,0,0,0,0,6]]},\n"
+        "    {\"type\": \"ct\", \"order\": 2, \"turn_rate\": 1,\n"
+        "     \"accel_std\": 1, \"x0\": [0,0,0,0], \"P0\": [[1,0,0,0],\n"
+        "     [0,1,0,0], [0,0,1,0], [0,0,0,1]]} ] }\n";
+    static const int map[4] = { 0, 1, 3, 4 };
+    static const char all_two[] =
+        "{ \"kind\": \"imm\", \"axes\": 1, \"order\": 3, \"sigma_z\": 1, "
+        "\"sojourn_s\": [1], \"modes\": [ {\"type\": \"cv\", "
+        "\"order\": 2, \"accel_std\": 1} ] }";
+    struct model model;
+    char *text;
+
+    (void)state;
+    assert_int_equal(model_read(&model, scratch_write("m.json", two_kinds)),
+                     0);
+    assert_int_equal(model.n, 6);
+    assert_int_equal(model.modes[0].n, 4);
+    assert_int_equal(model.modes[1].n, 6);
+    assert_int_equal(model.modes[2].n, 4);
+    assert_int_equal(model.motions[0].order, 2);
+    assert_int_equal(model.motions[1].order, 3);
+    assert_memory_equal(model.map[0], map, sizeof map);
+    assert_memory_equal(model.map[2], map, sizeof map);
+    assert_close(model.prior_var[2], 9, 0);
+    assert_close(model.prior_var[5], 9, 0);
+    assert_close(model.prior_x[5], 0, 0);
+    assert_close(model.x0[1], 2, 0);
+    assert_close(model.x0[3], 3, 0);
+    assert_close(model.x0[6 + 5], 10, 0);
+    assert_close(model.P0[4 * 6 + 1], 0.5, 0);
+    assert_close(model.P0[4 * 6 + 4], 4, 0);
+    assert_close(model.P0[36 + 35], 6, 0);
+    model_free(&model);
+    text = edited(two_kinds, "[1, 2, 3, 4]", "[1, 2, 0, 3, 4, 0]");
+    bad_model(text, "modes[0].x0: ", "4 numbers, has 6");
+    free(text);
+    bad_edit(two_kinds, "\"a0_std\": 3", "\"a0_std\": " TINY_STD,
+             "json: a0_std: ", "its square is 0");
+    bad_model(all_two, "json: order: ", "3, but every mode has order 2");
+    text = edited(all_two, "\"order\": 3", "\"order\": 2");
+    assert_int_equal(model_read(&model, scratch_write("m.json", text)), 0);
+    assert_null(model.map);
+    model_free(&model);
+    free(text);
+    text = edited(all_two, "\"order\": 3", "\"order\": 2");
+    bad_edit(text, "\"cv\", \"order\": 2", "\"cv\", \"order\": 3",
+             "modes[0].order: ", "3, but at the top it is 2");
+    free(text);
 }
 
 static void test_model_reference_cases(void **state)
@@ -658,6 +770,8 @@ int main(void)
         cmocka_unit_test(test_model_mistakes_of_keys_and_shapes),
         cmocka_unit_test(test_model_mistakes_of_numbers),
         cmocka_unit_test(test_model_mistakes_of_the_catalogue),
+        cmocka_unit_test(test_model_takes_singer),
+        cmocka_unit_test(test_model_takes_mixed_orders),
         cmocka_unit_test(test_model_reference_cases)
     };
 

@@ -234,6 +234,27 @@ static void test_host_interrupted(void **state)
     assert_int_equal(e.done, 1);
 }
 
+/* Whoever has another gate is not like the others. */
+static void test_host_and_pes_agree_about_gates(void **state)
+{
+    jl_u32 none = run_fingerprint(&model, &options), some, more;
+
+    (void)state;
+    options.gate = 0.99;
+    options.gate_most = 5;
+    some = run_fingerprint(&model, &options);
+    assert_true(some != none);
+    options.gate_most = 4;
+    more = run_fingerprint(&model, &options);
+    assert_true(more != none && more != some);
+    options.gate_most = 5;
+    options.gate = 0.9901;
+    more = run_fingerprint(&model, &options);
+    assert_true(more != none && more != some);
+    options.gate = 0.99;
+    assert_true(run_fingerprint(&model, &options) == some);
+}
+
 int main(void)
 {
     static const struct CMUnitTest tests[] = {
@@ -246,6 +267,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_host_notices_that_a_pe_is_dead,
                                         start, end),
         cmocka_unit_test_setup_teardown(test_host_interrupted, start, end),
+        cmocka_unit_test_setup_teardown(test_host_and_pes_agree_about_gates,
+                                        start, end),
     };
 
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -1,5 +1,6 @@
-/* Status texts, and exp, log, sin, cos: swept against the C library's functions
- * of the next wider type, and by the bits that every machine must find. */
+/* Status texts, and exp, log, sin, cos, atan2: swept against the C library's
+ * functions of the next wider type, and by the bits that every machine must
+ * find. */
 #include "close.h"
 
 #include <float.h>
@@ -32,6 +33,7 @@ typedef uint64_t bits;
 #define USUAL_DENORMAL 0.78             /* exp's denormal results */
 #define USUAL_LOG 0.56
 #define USUAL_SINCOS 0.83
+#define USUAL_ATAN2 0.51
 
 /* --- arguments ---------------------------------------------------------- */
 
@@ -397,6 +399,163 @@ static void test_sincos_refuses_what_is_out_of_range(void **state)
     }
 }
 
+/* --- atan2 -------------------------------------------------------------- */
+
+/* In all four quadrants, and mirrored at the diagonal. */
+static void atan2_at(double *worst_ulp, jl_real y, jl_real x)
+{
+    int i;
+
+    for (i = 0; i < 8; i++) {
+        const jl_real a = i & 1 ? -(i & 4 ? x : y) : i & 4 ? x : y;
+        const jl_real b = i & 2 ? -(i & 4 ? y : x) : i & 4 ? y : x;
+        const double ulp = error_in_ulp(jl_atan2(a, b),
+                                        W(atan2)((wide)a, (wide)b));
+
+        if (ulp > *worst_ulp)
+            *worst_ulp = ulp;
+        if (ulp <= USUAL_ATAN2)
+            continue;
+        print_error("atan2(%a, %a) is %.4f ulp off\n", (double)a, (double)b,
+                    ulp);
+        fail();
+    }
+}
+
+static void test_atan2_accuracy_in_all_directions(void **state)
+{
+    double worst_ulp = 0;
+    int i;
+
+    (void)state;
+    need_wide();
+    random_state = 6;
+    for (i = 0; i < RANDOMS / 8; i++) {
+        atan2_at(&worst_ulp, random_within(0, 1), random_within(0, 1));
+        atan2_at(&worst_ulp, random_positive(JL_EPSILON * JL_EPSILON, 1),
+                 random_within(JL_C(0.5), 1));
+    }
+    assert_true(worst_ulp > 0.4);       /* it was looked at */
+}
+
+/* Where the table's next row begins, around its angles, and where atan r
+ * becomes r, at many scales. */
+static void test_atan2_accuracy_at_borders(void **state)
+{
+    double worst_ulp = 0;
+    int row, k, i;
+
+    (void)state;
+    need_wide();
+    random_state = 7;
+    for (k = 0; k < 40; k++)
+        for (i = -40; i <= 40; i++) {
+            const jl_real x = random_within(JL_C(0.5), 1);
+            const wide scale = W(ldexp)(1, -(k * (MAX_EXP - 30)) / 40);
+            const jl_real b = (jl_real)(scale * (wide)x);
+
+            for (row = 0; row <= 16; row++) {
+                atan2_at(&worst_ulp, neighbour(
+                    (jl_real)(scale * (wide)(x * (jl_real)row / 16)), i), b);
+                atan2_at(&worst_ulp, neighbour((jl_real)(scale * (wide)(
+                    x * ((jl_real)row + JL_C(0.55)) / 16)), i), b);
+            }
+            for (row = 10; row <= 32; row++)
+                atan2_at(&worst_ulp, neighbour(
+                    (jl_real)W(ldexp)((wide)b, -row), i), b);
+        }
+}
+
+static void test_atan2_accuracy_at_extreme_lengths(void **state)
+{
+    const jl_real tiniest = from_bits(1);
+    double worst_ulp = 0;
+    int i, j;
+
+    (void)state;
+    need_wide();
+    random_state = 8;
+    for (i = 0; i < RANDOMS / 8; i++) {
+        const jl_real far = random_positive(tiniest, JL_REAL_MAX);
+
+        atan2_at(&worst_ulp, far, random_positive(tiniest, JL_REAL_MAX));
+        if (far < JL_REAL_MAX / 1024)
+            atan2_at(&worst_ulp, random_positive(far, far * 1024), far);
+    }
+    for (i = 1; i <= 60; i++)
+        for (j = 1; j <= 60; j++) {
+            atan2_at(&worst_ulp, from_bits((bits)i), from_bits((bits)j));
+            atan2_at(&worst_ulp, neighbour(JL_REAL_MAX, -i),
+                     neighbour(JL_REAL_MAX, -j));
+            atan2_at(&worst_ulp, neighbour(JL_REAL_MIN, i - 30),
+                     neighbour(JL_REAL_MIN, j - 30));
+            atan2_at(&worst_ulp, from_bits((bits)i), JL_REAL_MIN * (jl_real)j);
+            atan2_at(&worst_ulp, from_bits((bits)i), (jl_real)j);
+        }
+    atan2_at(&worst_ulp, tiniest, JL_REAL_MAX);
+}
+
+/* The same number, a zero's sign included. */
+static void check_angle(jl_real y, jl_real x, wide angle)
+{
+    const jl_real got = jl_atan2(y, x), want = (jl_real)angle;
+
+    if (to_bits(got) == to_bits(want))
+        return;
+    print_error("atan2(%g, %g) = %.17g, expected %.17g\n", (double)y,
+                (double)x, (double)got, (double)want);
+    fail();
+}
+
+/* C99, F.9.1.4. */
+static void test_atan2_special_values(void **state)
+{
+    const jl_real infinity = (jl_real)INFINITY, zero = 0;
+    const wide pi = W(acos)(-1);
+    const jl_real some[] = { from_bits(1), JL_REAL_MIN, 1, JL_REAL_MAX };
+    size_t i;
+    int s;
+
+    (void)state;
+    for (s = -1; s <= 1; s += 2) {
+        const jl_real sign = (jl_real)s;
+
+        check_angle(sign * zero, zero, (wide)(sign * zero));
+        check_angle(sign * zero, -zero, s * pi);
+        check_angle(sign * infinity, infinity, s * pi / 4);
+        check_angle(sign * infinity, -infinity, s * 3 * pi / 4);
+        check_angle(sign * infinity, sign * zero, s * pi / 2);
+        check_angle(sign * zero, infinity, (wide)(sign * zero));
+        check_angle(sign * zero, -infinity, s * pi);
+        for (i = 0; i < sizeof some / sizeof some[0]; i++) {
+            check_angle(sign * zero, some[i], (wide)(sign * zero));
+            check_angle(sign * zero, -some[i], s * pi);
+            check_angle(sign * some[i], zero, s * pi / 2);
+            check_angle(sign * some[i], -zero, s * pi / 2);
+            check_angle(sign * some[i], infinity, (wide)(sign * zero));
+            check_angle(sign * some[i], -infinity, s * pi);
+            check_angle(sign * infinity, some[i], s * pi / 2);
+            check_angle(sign * infinity, -some[i], s * pi / 2);
+            check_angle(sign * some[i], some[i], s * pi / 4);
+            check_angle(sign * some[i], -some[i], s * 3 * pi / 4);
+        }
+    }
+}
+
+static void test_atan2_of_nan_is_nan(void **state)
+{
+    const jl_real nan_ = (jl_real)NAN;
+    const jl_real some[] = { 0, -JL_C(0.0), 1, -1, (jl_real)INFINITY,
+                             -(jl_real)INFINITY, (jl_real)NAN };
+    size_t i;
+
+    (void)state;
+    for (i = 0; i < sizeof some / sizeof some[0]; i++) {
+        assert_true(isnan(jl_atan2(nan_, some[i])));
+        assert_true(isnan(jl_atan2(some[i], nan_)));
+    }
+}
+
 /* --- the same bits everywhere -------------------------------------------- */
 
 static uint32_t mixed(uint32_t hash, jl_real x)
@@ -430,6 +589,28 @@ static void test_elementary_bits_are_the_known_ones(void **state)
         hash = mixed(mixed(hash, s), c);
         assert_int_equal(jl_sincos(&s, &c, x / 256), JL_OK);
         hash = mixed(mixed(hash, s), c);
+    }
+    if (hash != known)
+        print_error("hash is 0x%08x\n", (unsigned)hash);
+    assert_true(hash == known);
+}
+
+static void test_atan2_bits_are_the_known_ones(void **state)
+{
+    const uint32_t known = JL_REAL_FLOAT ? 0x0fb06350u : 0xcbfb143bu;
+    uint32_t hash = 2166136261u;
+    int i;
+
+    (void)state;
+    random_state = 9;
+    for (i = 0; i < 200000; i++) {
+        const jl_real far = random_positive(from_bits(1), JL_REAL_MAX);
+        const jl_real y = random_within(-1, 1), x = random_within(-1, 1);
+
+        hash = mixed(hash, jl_atan2(y, x));
+        hash = mixed(hash, jl_atan2(x / 65536, y));
+        hash = mixed(hash, jl_atan2(far, x));
+        hash = mixed(hash, jl_atan2(far * y, far * x));
     }
     if (hash != known)
         print_error("hash is 0x%08x\n", (unsigned)hash);
@@ -483,7 +664,13 @@ int main(void)
         cmocka_unit_test(test_sincos_accuracy_at_zeros_and_borders),
         cmocka_unit_test(test_sincos_keeps_the_sign_of_zero),
         cmocka_unit_test(test_sincos_refuses_what_is_out_of_range),
+        cmocka_unit_test(test_atan2_accuracy_in_all_directions),
+        cmocka_unit_test(test_atan2_accuracy_at_borders),
+        cmocka_unit_test(test_atan2_accuracy_at_extreme_lengths),
+        cmocka_unit_test(test_atan2_special_values),
+        cmocka_unit_test(test_atan2_of_nan_is_nan),
         cmocka_unit_test(test_elementary_bits_are_the_known_ones),
+        cmocka_unit_test(test_atan2_bits_are_the_known_ones),
         cmocka_unit_test(test_status_texts_are_there_and_distinct),
         cmocka_unit_test(test_status_unknown_codes_have_a_text)
     };

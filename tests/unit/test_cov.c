@@ -244,6 +244,42 @@ static void test_cov_blend_is_a_pool_of_two(void **state)
     }
 }
 
+/* What both agree in stays, to the bit. */
+static void test_cov_blend_of_two_that_agree(void **state)
+{
+    int run, n;
+
+    (void)state;
+    for (run = 0; run < 400; run++) {
+        cov = covs[run % 2];
+        n = 1 + run / 2 % N;
+        make(2, n, run % 5 ? 0 : 12);
+        memcpy(x + n, x, (size_t)n * sizeof *x);
+        cov->blend(mean, out, w[0], x, S, w[1], x + n, S + n * n, room(2 * n),
+                   n);
+        assert_same_bits(mean, x, (size_t)n * sizeof *x);
+    }
+}
+
+/* Far from zero, near each other: the spread keeps its digits. */
+static void test_cov_pool_far_from_zero(void **state)
+{
+    wide m[N], want[N][N];
+    int run, n, i;
+
+    (void)state;
+    for (run = 0; run < 400; run++) {
+        cov = covs[run % 2];
+        n = 1 + run / 2 % N;
+        make(M_MAX, n, 0);
+        for (i = 0; i < M_MAX * n; i++)
+            x[i] += 1000;
+        cov->pool(mean, out, w, x, S, room(2 * n), M_MAX, n);
+        pooled(m, want, M_MAX, n);
+        check_cov(out, want, n, 64 * 1000 * EPS);
+    }
+}
+
 /* Estimates as far apart, and variances as large, as they may be. */
 static void test_cov_sums_cannot_overflow(void **state)
 {
@@ -409,6 +445,8 @@ int main(void)
         cmocka_unit_test(test_cov_take_and_give),
         cmocka_unit_test(test_cov_pool),
         cmocka_unit_test(test_cov_blend_is_a_pool_of_two),
+        cmocka_unit_test(test_cov_blend_of_two_that_agree),
+        cmocka_unit_test(test_cov_pool_far_from_zero),
         cmocka_unit_test(test_cov_sums_cannot_overflow),
         cmocka_unit_test(test_cov_part),
         cmocka_unit_test(test_cov_whole),

@@ -250,7 +250,7 @@ static void check_symmetric(const jl_real *P, int n)
 
 static struct {
     wide x[M_MAX][N_MAX], P[M_MAX][N_MAX][N_MAX], logmu[M_MAX];
-    wide xhat[N_MAX], Phat[N_MAX][N_MAX], loglik;
+    wide xhat[N_MAX], Phat[N_MAX][N_MAX], loglik, nis[M_MAX], nu[M_MAX][2];
 } book;
 
 /* Mean and covariance of the estimates pooled with weights w. */
@@ -344,8 +344,10 @@ static wide book_filter(int j, wide *x, wide (*P)[N_MAX], const jl_real *z)
             for (c = 0; c < n; c++)
                 P[a][c] -= K * HP[b][c];
         }
-    return -(m * logl(2 * acosl(-1)) + logl(det) + nu[0] * nu[0] * I[0][0]
-             + 2 * nu[0] * nu[1] * I[0][1] + nu[1] * nu[1] * I[1][1]) / 2;
+    memcpy(book.nu[j], nu, sizeof nu);
+    book.nis[j] = nu[0] * nu[0] * I[0][0] + 2 * nu[0] * nu[1] * I[0][1]
+        + nu[1] * nu[1] * I[1][1];
+    return -(m * logl(2 * acosl(-1)) + logl(det) + book.nis[j]) / 2;
 }
 
 static void book_step(const jl_real *z)
@@ -753,6 +755,73 @@ static void test_imm_sticky_equals_general(void **state)
     for (f = 0; f < FORMS; f++)
         for (M = 1; M <= M_MAX; M++)
             check_both_mixings(f, M, 1 + f % 2, 30);
+}
+
+/* Of every mode, what its update tells and its mean since set, and its
+ * covariance. */
+static void test_imm_innovations(void **state)
+{
+    jl_real z[Z_MAX], P[N_MAX * N_MAX];
+    double sum[M_MAX];
+    int run, i, j, k, count;
+
+    (void)state;
+    for (run = 0; run < 2 * FORMS; run++) {
+        make(4, 3, 1 + run % 2);
+        bind(&rig, forms[run / 2], JL_MIX_AUTO);
+        book_start();
+        memset(sum, 0, sizeof sum);
+        for (count = k = 0; k < 30; k++) {
+            const jl_real *given = k % 9 == 4 ? NULL : z;
+
+            make_z(z);
+            assert_int_equal(step(&rig, given), JL_OK);
+            book_step(given);
+            count += given != NULL;
+            assert_int_equal(rig.imm.accepted, count);
+            for (j = 0; j < 4; j++) {
+                double nis = (double)book.nis[j];
+
+                sum[j] += given != NULL ? nis : 0;
+                assert_close(rig.imm.nis[j], given != NULL ? nis : 0,
+                             2000 * EPS * (1 + nis));
+                assert_close(rig.imm.nis_mean[j], sum[j] / count,
+                             2000 * EPS * (1 + sum[j] / count));
+                for (i = 0; i < in.m; i++)
+                    assert_close(rig.imm.nu[j * in.m + i], book.nu[j][i],
+                                 5000 * EPS);
+                jl_imm_cov(&rig.imm, j, P);
+                for (i = 0; i < 9; i++)
+                    assert_close(P[i], book.P[j][i / 3][i % 3], 5000 * EPS);
+            }
+        }
+    }
+}
+
+/* After weeks at a kilohertz where a long has 32 bits. */
+static void test_imm_counts_do_not_wrap(void **state)
+{
+    const jl_real z = 1, absurd = JL_REAL_MAX;
+    int j, k;
+
+    (void)state;
+    make(3, 2, 1);
+    bind(&rig, &jl_kf_joseph, JL_MIX_AUTO);
+    rig.imm.accepted = ULONG_MAX - 1;
+    for (j = 0; j < 3; j++)
+        rig.imm.nis_mean[j] = 1;
+    for (k = 0; k < 3; k++) {
+        assert_int_equal(step(&rig, &z), JL_OK);
+        assert_true(rig.imm.accepted == ULONG_MAX);
+        for (j = 0; j < 3; j++)
+            assert_close(rig.imm.nis_mean[j], 1, 0.1);
+    }
+    jl_imm_gate(&rig.imm, JL_C(1.0e-9), 2);
+    rig.imm.run = INT_MAX;              /* what is absurd is never given in to */
+    for (k = 0; k < 3; k++) {
+        assert_int_equal(step(&rig, &absurd), JL_OK);
+        assert_int_equal(rig.imm.run, INT_MAX);
+    }
 }
 
 /* k sigma away from every mode. */
@@ -1365,6 +1434,53 @@ static void test_imm_stages_out_of_order(void **state)
     check_same(&rig.imm, &twin.imm);
 }
 
+/* judge comes once, between update_mode and weigh; whatever ends the step, bars
+ * both. */
+static void test_imm_judge_out_of_order(void **state)
+{
+    jl_real z[Z_MAX];
+    int end, j;
+
+    (void)state;
+    make(3, 2, 2);
+    make_z(z);
+    bind(&rig, &jl_kf_joseph, JL_MIX_AUTO);
+    bind(&twin, &jl_kf_joseph, JL_MIX_AUTO);
+    for (end = 0; end < 5; end++) {
+        memcpy(&before, &rig, sizeof rig);
+        assert_int_equal(jl_imm_judge(&rig.imm, z, spoilt()), JL_EORDER);
+        assert_same_bits(&rig, &before, sizeof rig);
+        assert_int_equal(jl_imm_mix(&rig.imm, spoilt()), JL_OK);
+        assert_int_equal(jl_imm_judge(&rig.imm, z, spoilt()), JL_EORDER);
+        for (j = 0; j < 3; j++) {
+            assert_int_equal(jl_imm_predict_mode(&rig.imm, j, spoilt()),
+                             JL_OK);
+            assert_int_equal(jl_imm_update_mode(&rig.imm, j, z, spoilt()),
+                             JL_OK);
+        }
+        assert_int_equal(jl_imm_weigh(&rig.imm), JL_EORDER);
+        assert_int_equal(jl_imm_judge(&rig.imm, z, spoilt()), JL_OK);
+        assert_int_equal(jl_imm_judge(&rig.imm, z, spoilt()), JL_EORDER);
+        if (end == 0)
+            jl_imm_chain(&rig.imm, in.Pi);
+        else if (end == 1)
+            jl_imm_set(&rig.imm, in.x, in.P, in.mu, spoilt());
+        else if (end == 2)
+            jl_imm_gate(&rig.imm, 0, 0);
+        else if (end == 3)
+            jl_imm_mix(&rig.imm, spoilt());
+        else
+            break;
+        assert_int_equal(jl_imm_weigh(&rig.imm), JL_EORDER);
+        assert_int_equal(jl_imm_judge(&rig.imm, z, spoilt()), JL_EORDER);
+        check_same(&rig.imm, &twin.imm);
+    }
+    assert_int_equal(jl_imm_weigh(&rig.imm), JL_OK);
+    jl_imm_combine(&rig.imm);
+    step(&twin, z);
+    check_same(&rig.imm, &twin.imm);
+}
+
 /* --- steps that fail ---------------------------------------------------- */
 
 /* What is wrong: nothing, mode j's prediction, or its S. */
@@ -1518,6 +1634,8 @@ int main(void)
         cmocka_unit_test(test_imm_sticky_is_found_out),
         cmocka_unit_test(test_imm_general_chains),
         cmocka_unit_test(test_imm_sticky_equals_general),
+        cmocka_unit_test(test_imm_innovations),
+        cmocka_unit_test(test_imm_counts_do_not_wrap),
         cmocka_unit_test(test_imm_outliers),
         cmocka_unit_test(test_imm_outlier_keeps_the_prior),
         cmocka_unit_test(test_imm_missing_measurement),
@@ -1534,6 +1652,7 @@ int main(void)
         cmocka_unit_test(test_imm_mixing_cannot_overflow),
         cmocka_unit_test(test_imm_routes_to_the_same_bits),
         cmocka_unit_test(test_imm_stages_out_of_order),
+        cmocka_unit_test(test_imm_judge_out_of_order),
         cmocka_unit_test(test_imm_failed_step_leaves_no_trace),
         cmocka_unit_test(test_imm_failed_piece_bars_weigh),
         cmocka_unit_test(test_imm_change_ends_the_step),

@@ -400,6 +400,76 @@ static void test_kf_forms_are_the_textbook(void **state)
             }
 }
 
+static void check_innovation(const struct rig *r, double nis_mean)
+{
+    const jl_innovation *got = &r->kf.innovation;
+    double size = 1 + (double)book.nis;
+    int i;
+
+    assert_close(got->loglik, book.loglik,
+                 500 * EPS * (1 + fabs((double)book.loglik)));
+    assert_close(got->nis, book.nis, 500 * EPS * size);
+    assert_close(r->kf.nis_mean, nis_mean, 500 * EPS * (1 + nis_mean));
+    for (i = 0; i < r->mode.m; i++)
+        assert_close(got->nu[i], book.nu[i], 500 * EPS);
+}
+
+/* What an update tells, and that a missing measurement tells nothing new. */
+static void test_kf_innovation(void **state)
+{
+    jl_real z[SMALL], P[SMALL * SMALL];
+    double sum;
+    int f, m, k, i, j;
+
+    (void)state;
+    for (f = 0; f < FORMS; f++)
+        for (m = 1; m <= 5; m++) {
+            make(&rig, forms[f], 4, m);
+            book_start(&rig);
+            for (sum = 0, k = 1; k <= 20; k++) {
+                for (i = 0; i < m; i++)
+                    z[i] = 3 * rnd();
+                book_predict(&rig.mode);
+                book_update(&rig.mode, z);
+                sum += (double)book.nis;
+                assert_int_equal(call(STEP, z), JL_OK);
+                check_innovation(&rig, sum / k);
+                assert_int_equal(rig.kf.accepted, k);
+                assert_int_equal(call(UPDATE, NULL), JL_OK);
+                check_innovation(&rig, sum / k);
+                assert_int_equal(rig.kf.accepted, k);
+                jl_kf_cov(&rig.kf, P);
+                for (i = 0; i < 4; i++)
+                    for (j = 0; j < 4; j++)
+                        assert_close(P[i * 4 + j], book.P[i][j], 2000 * EPS);
+            }
+        }
+}
+
+/* After weeks at a kilohertz where a long has 32 bits. */
+static void test_kf_counts_do_not_wrap(void **state)
+{
+    jl_real z = 1;
+    int k;
+
+    (void)state;
+    make(&rig, &jl_kf_joseph, 2, 1);
+    rig.kf.accepted = ULONG_MAX - 1;
+    rig.kf.nis_mean = 1;
+    for (k = 0; k < 3; k++) {
+        assert_int_equal(call(STEP, &z), JL_OK);
+        assert_true(rig.kf.accepted == ULONG_MAX);
+        assert_close(rig.kf.nis_mean, 1, 0.1);
+    }
+    jl_kf_gate(&rig.kf, JL_C(1.0e-9), 2);
+    rig.kf.run = INT_MAX;               /* what is absurd is never given in to */
+    z = JL_REAL_MAX;
+    for (k = 0; k < 3; k++) {
+        assert_int_equal(call(STEP, &z), JL_OK);
+        assert_int_equal(rig.kf.run, INT_MAX);
+    }
+}
+
 static void test_kf_scalar_closed_form(void **state)
 {
     const double log_2pi = 1.8378770664093454836;
@@ -443,7 +513,7 @@ static void test_kf_largest_sizes(void **state)
 /* A sensor nearly as good as rounding allows, on a prior of 1, for long. */
 static void test_kf_joseph_keeps_semidefinite(void **state)
 {
-    jl_motion motion = { JL_MOTION_CA, 2, 3, 1, 0, 0 };
+    jl_motion motion = { JL_MOTION_CA, 2, 3, 1, 0, 0, 0 };
     jl_real x[6], P[36], z[2] = { 0, 0 };
     int k;
 
@@ -634,6 +704,56 @@ static void test_kf_refuses_z_beyond_large(void **state)
     }
 }
 
+/* A form keeps to its scratch, whose size is the header's, and to the sizes of
+ * its outputs. */
+static void check_form_edges(const jl_kf_form *form, int n, int m)
+{
+    static jl_real x[MAX + 2 * EDGE], P[MAX * MAX + 2 * EDGE], z[MAX];
+    static jl_real nu[MAX + 2 * EDGE];
+    jl_innovation got;
+    int i, step;
+
+    make(&rig, form, n, m);
+    for (i = 0; i < m; i++)
+        z[i] = rnd();
+    for (step = 0; step < 2; step++) {
+        for (i = 0; i < JL_FORM_SCRATCH(n, m) + 2 * EDGE; i++)
+            scratch[i] = NAN_;
+        for (i = 0; i < MAX + 2 * EDGE; i++)
+            x[i] = nu[i] = NAN_;
+        for (i = 0; i < MAX * MAX + 2 * EDGE; i++)
+            P[i] = NAN_;
+        got.nu = nu + EDGE;
+        assert_int_equal(step == 0
+            ? form->predict(x + EDGE, P + EDGE, &rig.mode, rig.kf.x,
+                            rig.kf.P, scratch + EDGE)
+            : form->update(x + EDGE, P + EDGE, &got, &rig.mode, rig.kf.x,
+                           rig.kf.P, z, scratch + EDGE), JL_OK);
+        for (i = 0; i < EDGE; i++) {
+            assert_true(isnan(scratch[i]) && isnan(x[i]) && isnan(P[i]));
+            assert_true(isnan(scratch[EDGE + JL_FORM_SCRATCH(n, m) + i]));
+            assert_true(isnan(x[EDGE + n + i]));
+            assert_true(isnan(P[EDGE + n * n + i]));
+            assert_true(isnan(nu[i]) && isnan(nu[EDGE + m + i]));
+        }
+    }
+}
+
+static void test_kf_form_keeps_to_its_scratch(void **state)
+{
+    int f, n, m;
+
+    (void)state;
+    for (f = 0; f < FORMS; f++) {
+        for (n = 1; n <= SMALL; n++)
+            for (m = 1; m <= SMALL; m++)
+                check_form_edges(forms[f], n, m);
+        check_form_edges(forms[f], MAX, 1);
+        check_form_edges(forms[f], 1, MAX);
+        check_form_edges(forms[f], MAX, MAX);
+    }
+}
+
 /* A form that fails may have written its outputs, but nothing else. */
 static void test_kf_form_fails_alone(void **state)
 {
@@ -726,6 +846,8 @@ int main(void)
         cmocka_unit_test(test_kf_init),
         cmocka_unit_test(test_kf_set),
         cmocka_unit_test(test_kf_forms_are_the_textbook),
+        cmocka_unit_test(test_kf_innovation),
+        cmocka_unit_test(test_kf_counts_do_not_wrap),
         cmocka_unit_test(test_kf_scalar_closed_form),
         cmocka_unit_test(test_kf_largest_sizes),
         cmocka_unit_test(test_kf_joseph_keeps_semidefinite),
@@ -736,6 +858,7 @@ int main(void)
         cmocka_unit_test(test_kf_outlier),
         cmocka_unit_test(test_kf_refuses_measurements),
         cmocka_unit_test(test_kf_refuses_z_beyond_large),
+        cmocka_unit_test(test_kf_form_keeps_to_its_scratch),
         cmocka_unit_test(test_kf_form_fails_alone),
         cmocka_unit_test(test_kf_singular),
         cmocka_unit_test(test_kf_blow_up),
