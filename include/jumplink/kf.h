@@ -21,8 +21,8 @@
  * after 957 s, where r is 1e-10, standard gave a variance of the glider of
  * sim/data below 0; joseph was within 0.003 sigma of double all along.
  *
- * Form sqrt adds rows to a factor, and multiplies D by what is positive: D stays
- * >= 0, no square root is taken, and that error is some eps whatever r is.
+ * Form sqrt adds rows to a factor, and multiplies D by what is positive: D
+ * stays >= 0, no square root is taken, and that error is some eps for any r.
  * (Bierman 1977 for the update; rotations without square roots, Gentleman 1973,
  * for the prediction and the sums of an IMM, where Thornton 1976 has Gram-
  * Schmidt.)  States are best in the order in which they become known, position,
