@@ -13,8 +13,9 @@ static const char help[] =
     "loglik.\n\n"
     MODEL_HELP
     "  -o, --out FILE    where to (default: standard output)\n"
-    "  --diagnostics     more columns: of each mode j its innovation nu<j>_0..,\n"
-    "                    nis<j> = nu' S^-1 nu, nis_mean<j>; rejected (0, 1)\n"
+    "  --diagnostics     more columns: of each mode j its innovation\n"
+    "                    nu<j>_0.., nis<j> = nu' S^-1 nu and nis_mean<j>;\n"
+    "                    rejected (0, 1)\n"
     "  --truth A,-,B,..  ... and nees = e' P^-1 e, for data whose columns A,\n"
     "                    B,.. are the true state, in its order; -: unknown\n"
     COMMON_HELP

@@ -51,7 +51,8 @@ long estimates_times(const struct estimates *e, double *median_us,
                      double *p99_us);
 
 /* As CSV: time (and run), x, P upper triangle, mu, loglik, and diagnostics if
- * there are; all rows, or, when `partial`, those that were done and a last line that says so. */
+ * there are; all rows, or, when `partial`, those that were done and a last line
+ * that says so. */
 void estimates_write(const struct estimates *e, const struct data_file *data,
                      int partial, FILE *out);
 

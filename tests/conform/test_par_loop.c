@@ -228,8 +228,6 @@ static void test_par_gate_is_not_for_an_all_reduce(void **state)
 
 static void test_par_sizes_give_serial_bits(void **state)
 {
-    static const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard,
-                                               &jl_kf_sqrt };
     static struct run run = { .shape = { .hangs_at = -1, .sizes = 1 } };
     struct par_shape *s = &run.shape;
     int f, slots;
@@ -237,11 +235,11 @@ static void test_par_sizes_give_serial_bits(void **state)
     (void)state;
     s->M = PAR_M;
     for (s->npe = 1; s->npe <= 8; s->npe++)
-        for (f = 0; f < 3; f++)
+        for (f = 0; f < PAR_FORMS; f++)
             for (s->sticky = 0; s->sticky < 2; s->sticky++)
                 for (s->gate = 0; s->gate < 2; s->gate++)
                     for (slots = 0; slots <= 1; slots++) {
-                        s->form = forms[f];
+                        s->form = par_forms[f];
                         s->topology = s->npe % (JL_TOPO_CHAIN + 1);
                         compare(&run, slots);
                     }
@@ -251,20 +249,19 @@ static void test_par_sizes_give_serial_bits(void **state)
 
 /* The metric of a reference case: x in sigmas, P by sigmas, mu absolute, the
  * log-likelihood by 1 + |loglik|.  The limits are those of ordinary cases up
- * to the outlier, of 1000 sigma; of the last steps, whose measurements are
- * absurd, only the status is compared. */
+ * to the outlier, of 1000 sigma.  The last steps are not compared: after a
+ * measurement of JL_LARGE a spread is the rounding of means, squared, and it
+ * decides what still fits. */
 static void assert_close_trace(const struct par_trace *a,
                                const struct par_trace *b)
 {
     int k, i, j;
 
-    for (k = 0; k < PAR_STEPS; k++) {
+    for (k = 0; k < 50; k++) {
         double within = JL_REAL_FLOAT ? (k < 25 ? 2e-3 : 1e-1)
             : (k < 25 ? 1e-11 : 1e-9);
 
         assert_int_equal(a->status[k], b->status[k]);
-        if (k >= 50)
-            continue;
         for (i = 0; i < PAR_N; i++) {
             double sigma = sqrt((double)b->P[k][i * PAR_N + i]);
 

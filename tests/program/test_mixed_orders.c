@@ -138,6 +138,7 @@ static void test_orders_equal_padding(void **state)
     (void)state;
     check_padding("joseph");
     check_padding("standard");
+    check_padding("sqrt");
 }
 
 /* --- starts ---------------------------------------------------------------- */

@@ -1,5 +1,5 @@
-/* `--gate`: its limits, the same octets however it runs, and what it is worth on
- * a recorded flight with outliers (a table, when run by itself). */
+/* `--gate`: its limits, the same octets however it runs, and what it is worth
+ * on a recorded flight with outliers (a table, when run by itself). */
 #include "close.h"
 #include "scratch.h"
 #include "program.h"
@@ -370,8 +370,8 @@ static struct outcome fly(const char *model, const char *data, int gate)
         assert_int_equal(o.rejected, rejected);
     print_message("%-12s %-8s %-4s %9.2f %9.1f %8d %8d\n",
                   strstr(model, "two") != NULL ? "two_modes" : "eight_modes",
-                  spoilt ? "5%" : "none", gate ? "yes" : "no", o.velocity_rms, o.position_rms,
-                  o.rejected, o.of_injected);
+                  spoilt ? "5%" : "none", gate ? "yes" : "no",
+                  o.velocity_rms, o.position_rms, o.rejected, o.of_injected);
     return o;
 }
 

@@ -11,7 +11,11 @@
 
 enum { N = 2, M = 3 };
 
-static const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard };
+static const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard,
+                                           &jl_kf_sqrt };
+
+#define FORMS ((int)(sizeof forms / sizeof *forms))
+
 static const jl_real absurd[] = { JL_LARGE, -JL_LARGE, JL_REAL_MAX,
                                   -JL_REAL_MAX, JL_LARGE * 2 };
 
@@ -108,9 +112,11 @@ static void check_same(const struct one *a, const struct one *b)
  * with H = [1 0]. */
 static jl_real at_sigmas(const struct one *o, jl_real sigmas)
 {
-    const jl_real *x = o->kf.x, *P = o->kf.P, *W = o->mode.W;
-    jl_real S = P[0] + P[1] + P[2] + P[3] + W[0] + o->mode.R[0];
+    const jl_real *x = o->kf.x;
+    jl_real P[N * N], S;
 
+    jl_kf_cov(&o->kf, P);
+    S = P[0] + P[1] + P[2] + P[3] + o->mode.W[0] + o->mode.R[0];
     return x[0] + x[1] + sigmas * (jl_real)sqrt((double)S);
 }
 
@@ -140,7 +146,7 @@ static void test_kf_gate_at_its_limit(void **state)
     int f, side, k;
 
     (void)state;
-    for (f = 0; f < 2; f++)
+    for (f = 0; f < FORMS; f++)
         for (side = -1; side <= 1; side += 2) {
             make(&rig, forms[f]);
             make(&twin, forms[f]);
@@ -176,7 +182,7 @@ static void test_kf_gate_of_update_alone(void **state)
     int f, k;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make(&rig, forms[f]);
         make(&twin, forms[f]);
         jl_kf_gate(&rig.kf, GATE, 2);
@@ -209,7 +215,7 @@ static void test_kf_gate_gives_in(void **state)
     int f, i, k, round;
 
     (void)state;
-    for (f = 0; f < 2; f++)
+    for (f = 0; f < FORMS; f++)
         for (i = 0; i < 4; i++) {
             make(&rig, forms[f]);
             make(&twin, forms[f]);
@@ -267,7 +273,7 @@ static void test_kf_gate_of_nothing(void **state)
     int f, k, wide;
 
     (void)state;
-    for (f = 0; f < 2; f++)
+    for (f = 0; f < FORMS; f++)
         for (wide = 0; wide < 2; wide++) {
             make(&rig, forms[f]);
             make(&twin, forms[f]);
@@ -323,15 +329,14 @@ static void test_kf_gate_and_failures(void **state)
     int f, i;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make(&rig, forms[f]);
         jl_kf_gate(&rig.kf, GATE, 3);
         step(&rig, &z);
         for (i = 0; i < 3; i++)
             step_fails(&rig, &bad[i], JL_ENONFINITE);
-        rig.mode.R[0] = JL_C(-1.0e9);
+        rig.mode.R[0] = rig.mode.V[0] = JL_C(-1.0e9);
         step_fails(&rig, &z, JL_ESINGULAR);
-        rig.mode.R[0] = JL_REAL_MAX;
         rig.mode.F[0] = JL_REAL_MAX;
         assert_int_equal(jl_kf_step(&rig.kf, NULL, &z, spoilt()),
                          JL_ENONFINITE);
@@ -348,10 +353,9 @@ static void test_kf_gate_and_absurd_measurements(void **state)
     int f, k;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
-        make_scalar(&rig, forms[f], 1, 1, JL_REAL_MIN * 4, 0);
-        make_scalar(&twin, forms[f], 1, 1, JL_REAL_MIN * 4, 0);
-        rig.mode.W[0] = twin.mode.W[0] = JL_REAL_MIN;
+    for (f = 0; f < FORMS; f++) {
+        make_scalar(&rig, forms[f], JL_REAL_MIN, 1, JL_REAL_MIN * 4, 0);
+        make_scalar(&twin, forms[f], JL_REAL_MIN, 1, JL_REAL_MIN * 4, 0);
         jl_kf_gate(&rig.kf, GATE, 2);
         for (k = 0; k < 20; k++) {
             step(&rig, &absurd[k % ABSURD]);
@@ -371,13 +375,74 @@ static void test_kf_gate_and_absurd_measurements(void **state)
     }
 }
 
+/* On the way to the sum, infinities may meet: 0 times one, or two of them. */
+static void test_kf_gate_where_nis_is_no_number(void **state)
+{
+    static jl_mode mode;
+    static jl_real mode_mem[JL_MODE_MEM(2, 2, 1)], mem[JL_KF_STATE(2, 2)];
+    static jl_real work[JL_KF_SCRATCH(2, 2) + JL_MODE_SCRATCH(2, 2, 1)];
+    const jl_real eye[4] = { 1, 0, 0, 1 }, G[2] = { 1, 1 }, x[2] = { 0, 0 };
+    const jl_real q = JL_REAL_MIN, P[4] = { 0, 0, 0, 0 };
+    const jl_real z[2] = { JL_LARGE, JL_LARGE };
+    jl_real R[4] = { 0, 0, 0, 0 };
+    jl_kf kf;
+    int f;
+
+    (void)state;
+    R[0] = R[3] = 4 * JL_REAL_MIN;
+    for (f = 0; f < FORMS; f++) {
+        jl_mode_init(&mode, 2, 2, 1, mode_mem, JL_MODE_MEM(2, 2, 1));
+        assert_int_equal(jl_mode_set(&mode, eye, G, &q, NULL, eye, R, work),
+                         JL_OK);
+        assert_int_equal(jl_kf_init(&kf, &mode, forms[f], mem,
+                                    JL_KF_STATE(2, 2)), JL_OK);
+        assert_int_equal(jl_kf_set(&kf, x, P, work), JL_OK);
+        assert_int_equal(jl_kf_step(&kf, NULL, z, work), JL_ENONFINITE);
+        jl_kf_gate(&kf, GATE, 5);
+        assert_int_equal(jl_kf_step(&kf, NULL, z, work), JL_OK);
+        assert_int_equal(kf.verdict, JL_REJECTED);
+        assert_true(kf.innovation.nis > JL_REAL_MAX);
+        assert_true(kf.innovation.loglik < -JL_REAL_MAX);
+        assert_true(kf.x[0] == 0);
+    }
+    mode.V[3] = -1;             /* sqrt: after the first component is beyond */
+    assert_int_equal(jl_kf_step(&kf, NULL, z, work), JL_ESINGULAR);
+}
+
+/* A mode's function that has no value, say. */
+static int no_value(jl_real *x, jl_real *P, jl_innovation *innovation,
+                    const jl_mode *mode, const jl_real *xp, const jl_real *Pp,
+                    const jl_real *z, jl_real *work)
+{
+    (void)x, (void)P, (void)innovation, (void)mode, (void)xp, (void)Pp;
+    (void)z, (void)work;
+    return JL_ENONFINITE;
+}
+
+/* That is not the measurement's fault: an error, gate or no gate. */
+static void test_kf_gate_and_updates_without_nis(void **state)
+{
+    static jl_kf_form form;
+    jl_real z = 1000;
+
+    (void)state;
+    make(&rig, &jl_kf_joseph);
+    jl_kf_gate(&rig.kf, GATE, 5);
+    step(&rig, &z);
+    check_counts(&rig, JL_REJECTED, 1, 1, 0);
+    form = jl_kf_joseph;
+    form.update = no_value;
+    rig.kf.form = &form;
+    step_fails(&rig, &z, JL_ENONFINITE);
+}
+
 /* Without a gate they are an error, or ruin the filter if they can be used. */
 static void test_kf_absurd_measurements_without_a_gate(void **state)
 {
     int f, k;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make(&rig, forms[f]);
         for (k = 2; k < ABSURD; k++)
             step_fails(&rig, &absurd[k], JL_ENONFINITE);
@@ -396,7 +461,7 @@ static void test_kf_gate_and_estimates_beyond_large(void **state)
     int f;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         make_scalar(&rig, forms[f], 1, JL_C(0.25), 1, JL_LARGE);
         step_fails(&rig, &z, JL_ENONFINITE);
         jl_kf_gate(&rig.kf, GATE, 1);
@@ -489,7 +554,7 @@ static jl_real sigmas_of(const struct many *b, int j, jl_real sigmas)
     const jl_real zero = 0;
     ptrdiff_t by = (char *)&copy - (const char *)b;
     jl_imm *imm = &copy.imm;
-    jl_real nu, S;
+    jl_real nu, P[N * N];
 
     copy = *b;                          /* pointers, too, into the copy */
 #define MOVE(p) (p) = (void *)((char *)(p) + by)
@@ -503,9 +568,9 @@ static jl_real sigmas_of(const struct many *b, int j, jl_real sigmas)
     jl_imm_gate(imm, 0, 0);
     jl_imm_mix(imm, spoilt());
     jl_imm_predict_mode(imm, j, spoilt());
-    S = imm->Pw[j * N * N] + copy.modes[j].R[0];
+    imm->form->cov->give(P, imm->Pw + j * N * N, N);
     nu = zero - imm->xw[j * N];
-    return sigmas * (jl_real)sqrt((double)S) - nu;
+    return sigmas * (jl_real)sqrt((double)(P[0] + copy.modes[j].R[0])) - nu;
 }
 
 static void test_imm_gate_refuses(void **state)
@@ -582,7 +647,7 @@ static void test_imm_gate_is_joint(void **state)
     int f;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         check_joint(forms[f], general);
         check_joint(forms[f], sticky);
     }
@@ -617,7 +682,7 @@ static void test_imm_gate_gives_in(void **state)
     int f, i, k, round;
 
     (void)state;
-    for (f = 0; f < 2; f++)
+    for (f = 0; f < FORMS; f++)
         for (i = 0; i < 4; i++) {
             gather(&bank, forms[f], i % 2 ? general : sticky);
             gather(&other, forms[f], i % 2 ? general : sticky);
@@ -671,7 +736,7 @@ static void test_imm_gate_of_nothing(void **state)
     int f, k, wide;
 
     (void)state;
-    for (f = 0; f < 2; f++)
+    for (f = 0; f < FORMS; f++)
         for (wide = 0; wide < 2; wide++) {
             gather(&bank, forms[f], general);
             gather(&other, forms[f], general);
@@ -817,7 +882,7 @@ static void test_imm_gate_and_absurd_measurements(void **state)
     int f, k, i;
 
     (void)state;
-    for (f = 0; f < 2; f++) {
+    for (f = 0; f < FORMS; f++) {
         gather(&bank, forms[f], general);
         gather(&other, forms[f], general);
         for (i = 2; i < ABSURD; i++)            /* beyond JL_LARGE */
@@ -909,6 +974,8 @@ int main(void)
         cmocka_unit_test(test_kf_nis_and_its_mean),
         cmocka_unit_test(test_kf_gate_and_failures),
         cmocka_unit_test(test_kf_gate_and_absurd_measurements),
+        cmocka_unit_test(test_kf_gate_where_nis_is_no_number),
+        cmocka_unit_test(test_kf_gate_and_updates_without_nis),
         cmocka_unit_test(test_kf_absurd_measurements_without_a_gate),
         cmocka_unit_test(test_kf_gate_and_estimates_beyond_large),
         cmocka_unit_test(test_imm_gate_refuses),

@@ -18,8 +18,8 @@ enum { N = 6, M = 4, Z = 2, P_OWN = 2, P_MAX = P_OWN + N };
 typedef long double wide;
 
 static const jl_kf_form *const forms[] = { &jl_kf_joseph, &jl_kf_standard,
-                                           &jl_kf_sqrt };
-#define FORMS 3
+                                           &jl_kf_sqrt, &jl_kf_unscented };
+#define FORMS 4
 static uint32_t seed;
 
 /* Uniform in [-1, 1). */
