@@ -121,30 +121,33 @@ JL_INLINE jl_real jli_log_product(const jl_real *d, int m)
 }
 
 /* What the forms of the update share, all from S = H P- H' + R = L D L':
- *     Y  [m,n]   D^-1/2 L^-1 H P-
- *     y  [m]     D^-1/2 L^-1 nu, of the innovation's nu
+ *     Z  [m,n]   L^-1 H P-
+ *     K  [m,n]   D^-1 Z: x = x- + K'y, and P- - K'Z is P- - K S K' (standard)
+ *     y  [m]     L^-1 nu
  *     S  [m,m]   L below the diagonal
- *     r  [m]     D^-1/2
- *     d  [m]     D */
-JL_INLINE int jli_kf_innovate(jl_real *K, jl_real *Y, jl_real *y, jl_real *S, jl_real *r,
+ *     d  [m]     D
+ *     nis = y' D^-1 y
+ * scratch [m] */
+JL_INLINE int jli_kf_innovate(jl_real *Z, jl_real *K, jl_real *y, jl_real *S,
                               jl_real *d, jl_innovation *innovation,
                               const jl_real *H, const jl_real *R,
-                              const jl_real *Pp, int n, int m)
+                              const jl_real *Pp, jl_real *scratch, int n,
+                              int m)
 {
-    jl_real nis = 0;
+    jl_real *r = scratch, nis = 0;
     int a, status;
 
-    jli_mul(Y, H, Pp, m, n, n);
-    jli_mul_t_sym(S, Y, H, R, m, n);
+    jli_mul(Z, H, Pp, m, n, n);
+    jli_mul_t_sym(S, Z, H, R, m, n);
     status = jli_ldl(S, d, r, m);
     if (status != JL_OK)
         return status == JL_EDEF ? JL_ESINGULAR : status;
     for (a = 0; a < m; a++)
         y[a] = innovation->nu[a];
-    jli_unit_solve(S, Y, m, n);
+    jli_unit_solve(S, Z, m, n);
     jli_unit_solve(S, y, m, 1);
     for (a = 0; a < m; a++) {
-        jli_scale(K + a * n, r[a], Y + a * n, n);
+        jli_scale(K + a * n, r[a], Z + a * n, n);
         nis += y[a] * (y[a] * r[a]);
     }
     innovation->nis = nis;
@@ -163,7 +166,7 @@ JL_INLINE int jli_kf_likelihood(jl_innovation *innovation, const jl_real *d,
 }
 
 /* x = x- + K nu, P = (I - K H) P- (I - K H)' + K R K'
- * scratch [3 n n + 2 n m + m m + 3 m] */
+ * scratch [3 n n + 3 n m + m m + 5 m + n] */
 JL_INLINE int jli_kf_update_joseph(jl_real *x, jl_real *P,
                                    jl_innovation *innovation,
                                    const jl_mode *mode, const jl_real *xp,
@@ -171,35 +174,36 @@ JL_INLINE int jli_kf_update_joseph(jl_real *x, jl_real *P,
                                    jl_real *scratch, int n, int m)
 {
     const jl_real *H;
-    jl_real *K = scratch, *V = K + m * n, *S = V + m * n, *y = S + m * m;
-    jl_real *r = y + m, *d = r + m, *A = d + m, *U = A + n * n;
-    jl_real *Q = U + n * n;
+    jl_real *K = scratch, *Z = K + m * n, *S = Z + m * n, *y = S + m * m;
+    jl_real *d = y + m, *r = d + m, *A = r + m, *U = A + n * n;
+    jl_real *Q = U + n * n, *RK = Z;
     struct jli_squares sum = { 0, { 0 }, { 0 } };
     int i, j, status;
 
     status = jli_kf_sense(innovation->nu, &H, mode, xp, z, U, n, m);
     if (status == JL_OK)
-        status = jli_kf_innovate(K, V, y, S, r, d, innovation, H, mode->R, Pp, n,
-                                 m);
+        status = jli_kf_innovate(Z, K, y, S, d, innovation, H, mode->R, Pp,
+                                 r, n, m);
     if (status != JL_OK)
         return status;
     jli_row(x, xp, JLI_PLUS, y, 1, K, m, n);
     jli_square(&sum, x, n);
-    jli_unit_t_solve(S, K, m, n);               /* K' = S^-1 H P-           */
-    jli_mul(V, mode->R, K, m, m, n);            /* R K'                     */
-    jli_product(Q, NULL, JLI_PRODUCT, K, 1, n, V, 1, NULL, n, m, n);
-    for (i = 0; i < n; i++)
+    jli_unit_t_solve(S, K, m, n);               /* now the gain, transposed */
+    for (i = 0; i < n; i++)                     /* A = (I - K H)'           */
         for (j = 0; j < n; j++)
             A[i * n + j] = (jl_real)(i == j);
     jli_product(A, A, JLI_MINUS, H, 1, n, K, 0, NULL, n, m, n);
+    jli_mul(RK, mode->R, K, m, m, n);
+    jli_product(Q, NULL, JLI_PRODUCT, K, 1, n, RK, 1, NULL, n, m, n);
     jli_mul(U, Pp, A, n, n, n);
     jli_product(P, Q, JLI_PLUS, A, 1, n, U, 1, &sum, n, n, n);
     jli_mirror(P, n);
-    if (!jli_estimate_ok(&sum, x, P, n))
-        return JL_ENONFINITE;
-    return jli_kf_likelihood(innovation, d, m);
+    status = jli_kf_likelihood(innovation, d, m);
+    return jli_estimate_ok(&sum, x, P, n) ? status : JL_ENONFINITE;
 }
 
+/* x = x- + K nu, P = P- - K S K'
+ * scratch [3 n m + m m + 4 m + n] */
 JL_INLINE int jli_kf_update_standard(jl_real *x, jl_real *P,
                                      jl_innovation *innovation,
                                      const jl_mode *mode, const jl_real *xp,
@@ -207,24 +211,23 @@ JL_INLINE int jli_kf_update_standard(jl_real *x, jl_real *P,
                                      jl_real *scratch, int n, int m)
 {
     const jl_real *H;
-    jl_real *Y = scratch, *S = Y + m * n, *y = S + m * m, *r = y + m;
-    jl_real *d = r + m, *K = d + m;
+    jl_real *Z = scratch, *K = Z + m * n, *S = K + m * n, *y = S + m * m;
+    jl_real *d = y + m, *rest = d + m;
     struct jli_squares sum = { 0, { 0 }, { 0 } };
     int status;
 
-    status = jli_kf_sense(innovation->nu, &H, mode, xp, z, K + n * m, n, m);
+    status = jli_kf_sense(innovation->nu, &H, mode, xp, z, rest, n, m);
     if (status == JL_OK)
-        status = jli_kf_innovate(K, Y, y, S, r, d, innovation, H, mode->R, Pp, n,
-                                 m);
+        status = jli_kf_innovate(Z, K, y, S, d, innovation, H, mode->R, Pp,
+                                 rest + m * n, n, m);
     if (status != JL_OK)
         return status;
     jli_row(x, xp, JLI_PLUS, y, 1, K, m, n);
     jli_square(&sum, x, n);
-    jli_product(P, Pp, JLI_MINUS, Y, 1, n, K, 1, &sum, n, m, n);
+    jli_product(P, Pp, JLI_MINUS, Z, 1, n, K, 1, &sum, n, m, n);
     jli_mirror(P, n);
-    if (!jli_estimate_ok(&sum, x, P, n))
-        return JL_ENONFINITE;
-    return jli_kf_likelihood(innovation, d, m);
+    status = jli_kf_likelihood(innovation, d, m);
+    return jli_estimate_ok(&sum, x, P, n) ? status : JL_ENONFINITE;
 }
 
 #endif
