@@ -32,6 +32,19 @@ static int copy_modes(struct bank *bank)
     return 0;
 }
 
+/* Of fixed size if there is one; the bits are the same. */
+static const jl_kf_form *form_of(const struct bank *bank,
+                                 const struct options *options)
+{
+    const struct model *model = bank->model;
+    int j;
+
+    for (j = 0; j < model->M; j++)
+        if (bank->modes[j].n != model->n)
+            return options->form;
+    return jl_kf_fixed(options->form, model->n, model->m);
+}
+
 static int open_imm(struct bank *bank, const struct options *options)
 {
     const struct model *model = bank->model;
@@ -47,8 +60,9 @@ static int open_imm(struct bank *bank, const struct options *options)
         || bank->x == NULL || bank->P == NULL)
         return -1;
     return jl_imm_init_sizes(&bank->imm, M, n, bank->modes, model->map,
-                             model->prior_x, model->prior_var, options->form,
-                             JL_MIX_AUTO, bank->mem, JL_IMM_STATE(M, n, m))
+                             model->prior_x, model->prior_var,
+                             form_of(bank, options), JL_MIX_AUTO,
+                             bank->mem, JL_IMM_STATE(M, n, m))
             == JL_OK
         && jl_imm_gate(&bank->imm, options_gate(options, m),
                        options->gate_most) == JL_OK ? 0 : -1;
