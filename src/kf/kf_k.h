@@ -69,13 +69,15 @@ JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
     return jli_estimate_ok(&sum, xp, Pp, n) ? JL_OK : JL_ENONFINITE;
 }
 
+/* The same for a vector. */
 JL_INLINE int jli_vector_ok(const jl_real *v, int n)
 {
-    int i, ok = 1;
+    jl_real sum = 0;
+    int i;
 
     for (i = 0; i < n; i++)
-        ok &= v[i] >= -JL_LARGE && v[i] <= JL_LARGE;    /* false for NaN */
-    return ok;
+        sum += v[i] * v[i];
+    return sum <= JL_LARGE * JL_LARGE || jl_vec_within(v, n, JL_LARGE);
 }
 
 /* nu = z - h(x-), and the H to go with it: the mode's, or a Jacobian in
@@ -104,16 +106,19 @@ JL_INLINE int jli_normal(jl_real x)
     return x >= JL_REAL_MIN && x <= JL_REAL_MAX;
 }
 
-/* sum log d_a: one logarithm, of the product, unless that leaves the range in
+/* sum log d_a of normal d_a: one logarithm, of the product, unless that leaves the range in
  * which numbers have all digits. */
 JL_INLINE jl_real jli_log_product(const jl_real *d, int m)
 {
     jl_real product = d[0], sum = 0;
     int a;
 
-    for (a = 1; a < m && jli_normal(product); a++)
+    for (a = 1; a < m; a++) {
         product *= d[a];
-    if (jli_normal(product))
+        if (!jli_normal(product))
+            break;
+    }
+    if (a == m)
         return jl_log(product);
     for (a = 0; a < m; a++)
         sum += jl_log(d[a]);
@@ -178,7 +183,7 @@ JL_INLINE int jli_kf_update_joseph(jl_real *x, jl_real *P,
     jl_real *d = y + m, *r = d + m, *A = r + m, *U = A + n * n;
     jl_real *Q = U + n * n, *RK = Z;
     struct jli_squares sum = { 0, { 0 }, { 0 } };
-    int i, j, status;
+    int i, j, ok, status;
 
     status = jli_kf_sense(innovation->nu, &H, mode, xp, z, U, n, m);
     if (status == JL_OK)
@@ -198,8 +203,9 @@ JL_INLINE int jli_kf_update_joseph(jl_real *x, jl_real *P,
     jli_mul(U, Pp, A, n, n, n);
     jli_product(P, Q, JLI_PLUS, A, 1, n, U, 1, &sum, n, n, n);
     jli_mirror(P, n);
+    ok = jli_estimate_ok(&sum, x, P, n);
     status = jli_kf_likelihood(innovation, d, m);
-    return jli_estimate_ok(&sum, x, P, n) ? status : JL_ENONFINITE;
+    return ok ? status : JL_ENONFINITE;
 }
 
 /* x = x- + K nu, P = P- - K S K'
@@ -214,7 +220,7 @@ JL_INLINE int jli_kf_update_standard(jl_real *x, jl_real *P,
     jl_real *Z = scratch, *K = Z + m * n, *S = K + m * n, *y = S + m * m;
     jl_real *d = y + m, *rest = d + m;
     struct jli_squares sum = { 0, { 0 }, { 0 } };
-    int status;
+    int ok, status;
 
     status = jli_kf_sense(innovation->nu, &H, mode, xp, z, rest, n, m);
     if (status == JL_OK)
@@ -226,8 +232,9 @@ JL_INLINE int jli_kf_update_standard(jl_real *x, jl_real *P,
     jli_square(&sum, x, n);
     jli_product(P, Pp, JLI_MINUS, Z, 1, n, K, 1, &sum, n, m, n);
     jli_mirror(P, n);
+    ok = jli_estimate_ok(&sum, x, P, n);
     status = jli_kf_likelihood(innovation, d, m);
-    return jli_estimate_ok(&sum, x, P, n) ? status : JL_ENONFINITE;
+    return ok ? status : JL_ENONFINITE;
 }
 
 #endif
