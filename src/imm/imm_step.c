@@ -186,7 +186,7 @@ static void count(jl_imm *imm)
 int jl_imm_weigh(jl_imm *imm)
 {
     int j, M = imm->M;
-    jl_real *e = imm->e, best, sum, lse, r;
+    jl_real *e = imm->e, best, sum, lse;
 
     if (imm->stage != JLI_JUDGED)
         return JL_EORDER;
@@ -196,10 +196,9 @@ int jl_imm_weigh(jl_imm *imm)
         e[j] = imm->logmu[j];
     }
     lse = jli_log_sum_exp(e, M, &sum);
-    r = 1 / sum;
     for (j = 0; j < M; j++) {
         imm->logmu[j] -= lse;
-        imm->mu[j] = e[j] * r;
+        imm->mu[j] = e[j] / sum;
     }
     imm->loglik = imm->verdict == JL_ACCEPTED ? best + lse : 0;
     count(imm);
