@@ -11,7 +11,7 @@
  *               m degrees of freedom if the model is right
  *
  * The forms are equal in exact arithmetic (Bucy and Joseph 1968; the standard
- * form is computed as P- - Y'Y with Y = L^-1 H P-, S = L L').  Rounding tells
+ * form is computed as P- - Z' D^-1 Z, Z = L^-1 H P-, S = L D L').  Rounding tells
  * them apart, by r = R / (H P- H').  A covariance holds what measurements told
  * as differences of numbers as large as P-: at a start from next to nothing
  * variances have a relative error of eps / 4 r in form joseph and eps / r in
