@@ -60,7 +60,8 @@ int jl_mode_init(jl_mode *mode, int n, int m, int p, jl_real *mem, int cap);
 /* Give a mode its matrices (copied): F [n,n] G [n,p] Q [p,p] w_bar [p], H [m,n]
  * R [m,m]; scratch [JL_MODE_SCRATCH(n, m, p)].  NULL for w_bar is 0, and so it
  * is for F and H, in modes that have functions in their place.
- * Q must be positive semidefinite, R positive definite.
+ * Q must be positive semidefinite, R positive definite, with pivots of at least
+ * JL_REAL_MIN.
  * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF; *mode is untouched on
  * error. */
 int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,

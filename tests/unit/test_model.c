@@ -314,6 +314,30 @@ static void test_mode_set_refuses_covariances(void **state)
     assert_int_equal(set(0), JL_OK);
 }
 
+/* The factor of R has full rank, for R has, however
+ * alike two errors are. */
+static void test_mode_set_keeps_small_pivots(void **state)
+{
+    const jl_real *V;
+
+    (void)state;
+    make(&rig, 3, 2, 2);
+    make_input(2, 2);
+    V = rig.mode.V;
+    in.R[0] = in.R[3] = 1;
+    in.R[1] = in.R[2] = 1 - 8 * JL_EPSILON;
+    assert_int_equal(set(0), JL_OK);
+    assert_close(V[0], 1, 0);
+    assert_close(V[1], 1 - 8 * EPS, 0);
+    assert_close(V[3], 16 * EPS, EPS);
+    in.R[1] = in.R[2] = 0;
+    in.R[3] = JL_REAL_MIN;
+    assert_int_equal(set(0), JL_OK);
+    assert_close(V[3], JL_REAL_MIN, 0);
+    in.R[3] = JL_REAL_MIN / 2;                  /* no row of a factor */
+    assert_int_equal(set(0), JL_EDEF);
+}
+
 /* --- motions ------------------------------------------------------------ */
 
 static jl_motion motion_of(int kind, int axes, int order, jl_real rate)
@@ -997,6 +1021,7 @@ int main(void)
         cmocka_unit_test(test_mode_set_products),
         cmocka_unit_test(test_mode_set_refuses_nonfinite),
         cmocka_unit_test(test_mode_set_refuses_covariances),
+        cmocka_unit_test(test_mode_set_keeps_small_pivots),
         cmocka_unit_test(test_motion_closed_forms),
         cmocka_unit_test(test_motion_forgets_the_former),
         cmocka_unit_test(test_motion_turn_is_an_arc),
