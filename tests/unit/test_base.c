@@ -1,6 +1,6 @@
-/* Status texts, and exp, log, sin, cos, sqrt, atan2: swept against the C library's
- * functions of the next wider type, and by the bits that every machine must
- * find. */
+/* Status texts, and exp, log, sin, cos, sqrt, atan2: swept against the C
+ * library's functions of the next wider type, and by the bits that every
+ * machine must find. */
 #include "close.h"
 
 #include <float.h>
