@@ -174,7 +174,11 @@ int jl_motion_noises(const jl_motion *motion);
  * Returns JL_OK, JL_EDIM (sizes, axes, order, kind), JL_ENONFINITE (a number
  * of the motion or dt above sqrt(JL_LARGE), or a product above JL_LARGE),
  * JL_ERANGE (accel_std < 0, sigma_z^2 < JL_REAL_MIN, tau_s <= 0 or tau_s
- * below 1 / sqrt(JL_LARGE)), JL_ETIME (dt < 0); *mode is untouched on error. */
+ * below 1 / sqrt(JL_LARGE)), JL_ETIME (dt < 0); *mode is untouched on error.
+ *
+ * With another sensor, such as a radar, fill a mode by this, and from it one
+ * with p = n noises, where I [n,n] is the identity and H may be NULL:
+ *     jl_mode_set(&radar, cv.F, I, cv.W, NULL, H, R, scratch) */
 int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt);
 
 /* The state after a first measurement z [axes]: x [n] at z with velocity 0 and
