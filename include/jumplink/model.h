@@ -73,8 +73,8 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
  *     x(k+1) = f(x(k)) + G (w + w_bar),     z(k) = h(x(k)) + v
  * Each function returns JL_OK, or a negative code of base.h that ends the step
  * (a bearing has no value at range 0: JL_ERANGE).  It must depend on nothing
- * but its arguments and what context points to (of which a time step that varies
- * is part), and be the same on every PE; same bits everywhere need base.h's
+ * but its arguments and what context points to (a time step that varies is
+ * there), and be the same on every PE; same bits everywhere need base.h's
  * elementary functions.
  * The forms joseph, standard and sqrt linearise f at the estimate and h at the
  * prediction (extended Kalman filter: Jazwinski 1970, chapter 8); the form
