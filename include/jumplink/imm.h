@@ -17,9 +17,10 @@
  * every mode, or a mode that was improbable for an hour, does no harm.  A mode
  * that cannot be entered (c_j = 0) keeps its own estimate unmixed.
  *
- * Mixing costs O(M^2 n^2).  If Pi = diag(lambda) + 1 v' with lambda >= 0 (stay
- * with probability p, else anywhere alike; any 2 x 2 chain with Pi00 + Pi11
- * >= 1) mode j pools only its own estimate and the combined one, O(M n^2):
+ * Mixing costs O(M^2 n^2), with factors O(M^2 n^3).  If Pi = diag(lambda)
+ * + 1 v' with lambda >= 0 (stay with probability p, else anywhere alike; any
+ * 2 x 2 chain with Pi00 + Pi11 >= 1) mode j pools only its own estimate and the
+ * combined one, O(M n^2) and O(M n^3):
  *               c_j  = lambda_j mu_j + v_j,  a = lambda_j mu_j / c_j,
  *               b    = v_j / c_j,            d = x_j - xhat
  *               x0_j = a x_j + b xhat,  P0_j = a P_j + b Phat + a b d d'
@@ -165,7 +166,9 @@ void jl_imm_cov(const jl_imm *imm, int j, jl_real *P);
 int jl_imm_chain(jl_imm *imm, const jl_real *Pi);
 
 /* Set the state: x [M,n], P [M,n,n], mu [M] (copied); scratch
- * [JL_IMM_SCRATCH(M, n, m)].  A probability of 0 is allowed.  Of components
+ * [JL_IMM_SCRATCH(M, n, m)].  A probability of 0 is allowed.  Modes of
+ * different states have their components at their places among the n
+ * (jl_motion_start of the motion that has all fits the others, too); of those
  * that a mode lacks, x and P are checked (zeros will do) and the prior is set.
  * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF, JL_EPROB; unchanged on
  * error. */

@@ -12,7 +12,7 @@
 
 #include "jumplink/imm.h"
 
-enum { M = 4, N = 4, Z = 2, LAP = 220, USUAL = 100000 };
+enum { M = 4, N = 4, Z = 2, LAP = 220, USUAL = 50000 };
 
 typedef long double wide;
 
@@ -64,8 +64,8 @@ struct worst {
     double x, P, mu;                    /* x, P in sigmas */
 };
 
-/* A sensor; and how far from the textbook an estimate may be, the third
- * behind an outlier being another matter: what it says of the modes is the
+/* A sensor; and how far from the textbook an estimate may be: usually, and in
+ * the third of the time behind an outlier, for what that says of the modes is a
  * difference of large numbers. */
 struct scene {
     const char *name;
@@ -240,8 +240,11 @@ static void set_modes(double sigma)
     int j;
 
     for (j = 0; j < M; j++) {
-        jl_motion motion = { JL_MOTION_CT, Z, 2, 0, 0, 0 };
+        jl_motion motion = { 0 };
 
+        motion.kind = JL_MOTION_CT;
+        motion.axes = Z;
+        motion.order = 2;
         motion.accel_std = accel[j];
         motion.turn_rate = turn[j];
         motion.sigma_z = (jl_real)sigma;
@@ -255,12 +258,15 @@ static void start(const struct scene *s, const jl_kf_form *form)
 {
     static const jl_real sojourn[M] = { 40, 40, 40, 40 };
     const jl_real z[Z] = { -3750, -2866 };
-    jl_motion motion = { JL_MOTION_CV, Z, 2, 0, 0, 0 };
+    jl_motion motion = { 0 };
     jl_real x[M * N], P[M * N * N];
     int i, j;
 
     seed = 1;
     set_modes(s->sigma);
+    motion.kind = JL_MOTION_CV;
+    motion.axes = Z;
+    motion.order = 2;
     motion.sigma_z = (jl_real)s->sigma;
     for (j = 0; j < M; j++)
         jl_motion_start(x + j * N, P + j * N * N, &motion, z, 200, 10);
@@ -307,21 +313,23 @@ static void endure(const struct scene *s)
         check_valid();
     }
     check_worst(&calm, &s->calm, s->name);
-    check_worst(&shaken, &s->shaken, "  ... after an outlier");
+    if (s->outlier > 0)
+        check_worst(&shaken, &s->shaken, "  ... after an outlier");
 }
 
 /* --- scenes --------------------------------------------------------------- */
 
+/* About five times the worst of 10^7 steps. */
 #if JL_REAL_FLOAT
-#define RADAR { 2e-3, 2e-3, 1e-3 }, { 1, 1, 1 }
-#define LASER { 0.2, 0.1, 0.02 }, { 0, 0, 0 }
+#define RADAR { 2e-3, 2e-3, 5e-4 }, { 0.1, 0.1, 0.05 }
+#define LASER { 0.2, 0.05, 0.01 }, { 0, 0, 0 }
 #else
-#define RADAR { 4e-12, 4e-12, 2e-12 }, { 4e-9, 4e-9, 4e-9 }
-#define LASER { 4e-10, 4e-9, 4e-11 }, { 0, 0, 0 }
+#define RADAR { 4e-12, 4e-12, 1e-12 }, { 2e-10, 2e-10, 1e-10 }
+#define LASER { 4e-10, 4e-9, 2e-11 }, { 0, 0, 0 }
 #endif
 
-/* 20 m, with outliers; and 5 cm after a minute of nothing, which is 1e-11 of
- * H P- H'. */
+/* 20 m, with outliers; and 5 cm after a minute of nothing, R / (H P- H') being
+ * 1e-11 then.  Positions of 4 km in float have 0.2 mm. */
 static const struct scene radar = {
     "radar", JL_MIX_AUTO, 20, 10, 5000, 20, RADAR
 };
