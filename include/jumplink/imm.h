@@ -179,7 +179,8 @@ int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,
  * measurement: the modes are only predicted, log mu = log c, loglik = 0; the
  * same with one that the gate rejects.
  * Returns JL_OK, or the code of the first mode that failed: JL_ENONFINITE,
- * JL_ESINGULAR; the filter is then as before the step. */
+ * JL_ESINGULAR, a nonlinear mode's own; the filter is then as before the
+ * step. */
 int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch);
 
 /* The stages, scratch as above, in this order; mix may be called at any
