@@ -14,8 +14,9 @@ static const char help[] =
     MODEL_HELP
     "  -o, --out FILE    where to (default: standard output)\n"
     "  --diagnostics     more columns: of each mode j its innovation\n"
-    "                    nu<j>_0.., nis<j> = nu' S^-1 nu and nis_mean<j>;\n"
-    "                    rejected (0, 1)\n"
+    "                    nu<j>_0.., nis<j> = nu' S^-1 nu, and nis_mean<j>\n"
+    "                    of those accepted so far; rejected by the gate\n"
+    "                    (0, 1); nan: not in this row\n"
     "  --truth A,-,B,..  ... and nees = e' P^-1 e, for data whose columns A,\n"
     "                    B,.. are the true state, in its order; -: unknown\n"
     COMMON_HELP
@@ -45,7 +46,7 @@ static int check_diagnostics(const struct options *options)
 int cmd_filter(int argc, char **argv)
 {
     static const struct option known[] = {
-        { "diagnostics", no_argument, NULL, 'd' },
+        { "diagnostics", no_argument, NULL, 2001 },
         { "truth", required_argument, NULL, 't' },
         COMMON_OPTIONS, { 0 }
     };
@@ -58,7 +59,7 @@ int cmd_filter(int argc, char **argv)
             fputs(help, stdout);
             return 0;
         }
-        if (c == 'd')
+        if (c == 2001)
             options.diagnostics = 1;
         else if (c == 't')
             options.truth = optarg;

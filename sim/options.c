@@ -216,8 +216,11 @@ int options_take(struct options *o, int c, char *const *argv)
         return take_word(&o->out, o->command, "out", value);
     case ':':
         return misuse(o->command, "%s needs a value", argv[optind - 1]);
-    default:
-        if (optopt > 0 && optopt < 256 && argv[optind - 1][1] != '-')
+    default:                            /* what optopt is, getopt(3) says */
+        if (optopt > 256 || optopt == 'h')
+            return misuse(o->command, "%s: it takes no value",
+                          argv[optind - 1]);
+        if (optopt > 0)
             return misuse(o->command, "unknown option -%c", optopt);
         return misuse(o->command, "unknown option %s", argv[optind - 1]);
     }

@@ -43,7 +43,9 @@ struct options {
 };
 
 /* The long options above, for getopt_long; their values are beyond any
- * character, and those of a command's own options are its characters. */
+ * character, and those of a command's own options are its characters, or, of
+ * one that takes no value, beyond them, too: such a value is then told from an
+ * unknown short option. */
 #define COMMON_OPTIONS \
     { "filter", required_argument, NULL, 1001 }, \
     { "mode", required_argument, NULL, 1002 }, \
@@ -70,23 +72,26 @@ struct options {
     "  --form joseph|standard|sqrt  how covariances are kept and updated\n" \
     "                    (default joseph; sqrt: as factors)\n" \
     "  --gate P          reject outliers, which no mode expects: a good\n" \
-    "                    measurement passes with probability P (0.9999)\n" \
+    "                    measurement passes with probability P, say 0.9999\n" \
+    "                    (default: no gate)\n" \
     "  --gate-most N     ... until N were rejected in a row; then it is the\n" \
     "                    filter that is wrong (default 5)\n"
 #define MODEL_HELP \
-    "The model is JSON.  Modes of the catalogue follow any time step; each\n" \
-    "has an accel_std and a type: cv; ca (order 3); ct (axes 2), with a\n" \
-    "turn_rate; singer (order 3), with a tau_s.  At the top: axes, order,\n" \
-    "sigma_z, and sojourn_s or Pi; and v0_std, a0_std of velocity (default\n" \
-    "100) and acceleration (10) before anything is known.  A mode may have\n" \
-    "order 2 beside others of order 3, the model's: to them its acceleration\n" \
-    "is 0 +- a0_std.  Or modes by matrices: Phi, Gamma, Q, H, R, and n, m,\n" \
-    "Pi, mu0 at the top.\n\n"
+    "The model is JSON: { \"kind\": \"imm\", \"modes\": [ {..}, .. ], .. }.\n" \
+    "Modes of the catalogue follow any time step; each has an accel_std\n" \
+    "and a type: cv; ca (order 3); ct (axes 2), with a turn_rate; singer\n" \
+    "(order 3), with a tau_s.  At the top: axes, order, sigma_z, sojourn_s\n" \
+    "(mean times in each mode) or Pi; and v0_std, a0_std of velocity\n" \
+    "(default 100) and acceleration (10) before anything is known.  A mode\n" \
+    "may have order 2 beside others of order 3, the model's: to them its\n" \
+    "acceleration is 0 +- a0_std.  Or modes by matrices: Phi, Gamma, Q, H,\n" \
+    "R, and n, m, Pi, mu0 at the top; x0, P0 in each mode or at the top.\n\n"
 #define DATA_HELP \
     "  --hold HOW        which measurements count as lost: none; detect:\n" \
     "                    those that repeat the row before exactly; column:\n" \
     "                    those with 0 in column arrived (default: column\n" \
-    "                    if there is one, else none)\n" \
+    "                    if there is one, else none).  Empty and nan always\n" \
+    "                    do.  A new value in column run starts anew\n" \
     "  --z A,B,..        columns of the measurement (default z0,z1,..)\n" \
     "  --time NAME       column of the time (default t_s, else k)\n"
 #define HELP_HELP \

@@ -117,6 +117,10 @@ int jl_sincos(jl_real *s, jl_real *c, jl_real x);
  * is infinitely further than any number and as far as another; NaN for NaN. */
 jl_real jl_atan2(jl_real y, jl_real x);
 
+/* The square root, exactly rounded: the C library's, for jl_real (C89's math.h
+ * has none for float).  NaN for x < 0 and for NaN. */
+jl_real jl_sqrt(jl_real x);
+
 #ifdef __cplusplus
 }
 #endif

@@ -166,7 +166,9 @@ void jl_imm_cov(const jl_imm *imm, int j, jl_real *P);
 int jl_imm_chain(jl_imm *imm, const jl_real *Pi);
 
 /* Set the state: x [M,n], P [M,n,n], mu [M] (copied); scratch
- * [JL_IMM_SCRATCH(M, n, m)].  A probability of 0 is allowed.  Of components
+ * [JL_IMM_SCRATCH(M, n, m)].  A probability of 0 is allowed.  Modes of
+ * different states have their components at their places among the n
+ * (jl_motion_start of the motion that has all fits the others, too); of those
  * that a mode lacks, x and P are checked (zeros will do) and the prior is set.
  * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF, JL_EPROB; unchanged on
  * error. */
@@ -177,7 +179,8 @@ int jl_imm_set(jl_imm *imm, const jl_real *x, const jl_real *P,
  * measurement: the modes are only predicted, log mu = log c, loglik = 0; the
  * same with one that the gate rejects.
  * Returns JL_OK, or the code of the first mode that failed: JL_ENONFINITE,
- * JL_ESINGULAR; the filter is then as before the step. */
+ * JL_ESINGULAR, a nonlinear mode's own; the filter is then as before the
+ * step. */
 int jl_imm_step(jl_imm *imm, const jl_real *z, jl_real *scratch);
 
 /* The stages, scratch as above, in this order; mix may be called at any

@@ -203,6 +203,7 @@ void jl_kf_cov(const jl_kf *kf, jl_real *P);
  *     m           1      2      3      4      5      6
  *     p 0.99    6.63   9.21  11.34  13.28  15.09  16.81
  *     p 0.999  10.83  13.82  16.27  18.47  20.52  22.46
+ *     p 0.9999 15.14  18.42  21.11  23.51  25.74  27.86
  * What is finite but too large to be used, a z beyond JL_LARGE or an infinite
  * nis, is an error without a gate, and with one always rejected.
  * Returns JL_OK, or JL_ERANGE (nis not finite or below 0, most below 0). */

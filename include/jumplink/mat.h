@@ -51,8 +51,9 @@ void jl_mat_lower_solve(const jl_real *L, jl_real *y, int n);
 /* A = U' D U of a positive semidefinite A [n,n], of which the upper triangle is
  * read, by its largest pivots: U upper with a unit diagonal, D diagonal, >= 0.
  * In S [n,n]: U above the diagonal, D on it, zeros below.  What is left of A
- * when no pivot is above 64 n eps, scaled to a unit diagonal, is taken for
- * rounding.  S may be A.  work [n n + 2 n]                  at most 2 n^3 */
+ * when no pivot is above 64 n eps, scaled to a unit diagonal, is little more
+ * than rounding: of it the variances are kept, not the covariances.  S may be
+ * A.  work [n n + 2 n]                                      at most 2 n^3 */
 void jl_mat_ud(jl_real *S, const jl_real *A, jl_real *work, int n);
 
 /* P = U' D U from S, as above.  P may not be S.                    n^3/3  */

@@ -60,7 +60,8 @@ int jl_mode_init(jl_mode *mode, int n, int m, int p, jl_real *mem, int cap);
 /* Give a mode its matrices (copied): F [n,n] G [n,p] Q [p,p] w_bar [p], H [m,n]
  * R [m,m]; scratch [JL_MODE_SCRATCH(n, m, p)].  NULL for w_bar is 0, and so it
  * is for F and H, in modes that have functions in their place.
- * Q must be positive semidefinite, R positive definite.
+ * Q must be positive semidefinite, R positive definite, with pivots of at least
+ * JL_REAL_MIN.
  * Returns JL_OK, JL_ENONFINITE, JL_EASYM, JL_EDEF; *mode is untouched on
  * error. */
 int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
@@ -73,8 +74,9 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
  *     x(k+1) = f(x(k)) + G (w + w_bar),     z(k) = h(x(k)) + v
  * Each function returns JL_OK, or a negative code of base.h that ends the step
  * (a bearing has no value at range 0: JL_ERANGE).  It must depend on nothing
- * but its arguments and what context points to, and be the same on every PE;
- * same bits everywhere need base.h's elementary functions.
+ * but its arguments, which are finite, and what context points to (a time step
+ * that varies is there), and be the same on every PE; same bits everywhere need
+ * base.h's elementary functions.
  * The forms joseph, standard and sqrt linearise f at the estimate and h at the
  * prediction (extended Kalman filter: Jazwinski 1970, chapter 8); the form
  * unscented does not.  States are averaged as they are: an angle among them
@@ -174,7 +176,11 @@ int jl_motion_noises(const jl_motion *motion);
  * Returns JL_OK, JL_EDIM (sizes, axes, order, kind), JL_ENONFINITE (a number
  * of the motion or dt above sqrt(JL_LARGE), or a product above JL_LARGE),
  * JL_ERANGE (accel_std < 0, sigma_z^2 < JL_REAL_MIN, tau_s <= 0 or tau_s
- * below 1 / sqrt(JL_LARGE)), JL_ETIME (dt < 0); *mode is untouched on error. */
+ * below 1 / sqrt(JL_LARGE)), JL_ETIME (dt < 0); *mode is untouched on error.
+ *
+ * With another sensor, such as a radar, fill a mode by this, and from it one
+ * with p = n noises, where I [n,n] is the identity and H may be NULL:
+ *     jl_mode_set(&radar, cv.F, I, cv.W, NULL, H, R, scratch) */
 int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt);
 
 /* The state after a first measurement z [axes]: x [n] at z with velocity 0 and

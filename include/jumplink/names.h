@@ -14,6 +14,7 @@
 #define jl_log jl_log_f32
 #define jl_sincos jl_sincos_f32
 #define jl_atan2 jl_atan2_f32
+#define jl_sqrt jl_sqrt_f32
 
 #define jl_mat_mul jl_mat_mul_f32
 #define jl_mat_mul_t jl_mat_mul_t_f32

@@ -64,6 +64,8 @@ static int look(jl_real *y, const struct map *f, const jl_real *x, jl_real c,
     at[k] += c;
     for (i = k + 1; i < n; i++)
         at[i] += c * S[k * n + i];
+    if (!jl_vec_within(at, n, JL_LARGE))
+        return JL_ENONFINITE;
     status = value(y, f, at);
     return status == JL_OK ? subtract(y, f, y0) : status;
 }

@@ -19,7 +19,8 @@ static int largest(const jl_real *B, const jl_real *diagonal, int n)
 }
 
 /* By rows in the order of pivots, for small pivots taken early would magnify
- * rounding; each row goes into the triangle, which keeps the order of states. */
+ * rounding; each row goes into the triangle, which keeps the order of states.
+ * Of what is left the diagonal: as zeros, it would claim to be known. */
 void jl_mat_ud(jl_real *S, const jl_real *A, jl_real *work, int n)
 {
     jl_real *B = work, *diagonal = B + n * n, *v = diagonal + n;
@@ -36,7 +37,7 @@ void jl_mat_ud(jl_real *S, const jl_real *A, jl_real *work, int n)
 
         b = largest(B, diagonal, n);
         if (b < 0)
-            return;
+            break;
         d = B[b * (n + 1)];
         for (j = 0; j < n; j++)
             v[j] = B[b * n + j] / d;
@@ -47,6 +48,12 @@ void jl_mat_ud(jl_real *S, const jl_real *A, jl_real *work, int n)
             B[i * n + b] = B[b * n + i] = 0;
         jli_ud_absorb(S, v, d, 0, n);
     }
+    for (i = 0; left > 0 && i < n; i++)
+        if (B[i * (n + 1)] > 0) {
+            memset(v, 0, (size_t)n * sizeof *v);
+            v[i] = 1;
+            jli_ud_absorb(S, v, B[i * (n + 1)], i, n);
+        }
 }
 
 void jl_mat_ud_product(jl_real *P, const jl_real *S, int n)

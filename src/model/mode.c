@@ -45,6 +45,26 @@ static void set_noises(jl_mode *mode, const jl_real *G, const jl_real *UD)
     }
 }
 
+/* R = U' D U in V.  Of full rank, unlike jl_mat_ud's: with a small pivot cut
+ * off a measurement that is good would be taken for an exact one. */
+static int factor(jl_real *V, const jl_real *R, int m)
+{
+    int a, b, c;
+
+    memset(V, 0, (size_t)(m * m) * sizeof *V);
+    for (a = 0; a < m; a++)
+        for (b = a; b < m; b++) {
+            jl_real s = R[a * m + b];
+
+            for (c = 0; c < a; c++)
+                s -= V[c * m + c] * V[c * m + a] * V[c * m + b];
+            if (b == a && !(s >= JL_REAL_MIN))
+                return JL_EDEF;
+            V[a * m + b] = b == a ? s : s / V[a * m + a];
+        }
+    return JL_OK;
+}
+
 /* NULL stands for zeros. */
 static int within(const jl_real *v, int n)
 {
@@ -64,8 +84,8 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
                 const jl_real *R, jl_real *scratch)
 {
     int n = mode->n, m = mode->m, p = mode->p, status;
-    jl_real *W = scratch, *GQ = W + n * n, *L = GQ + n * (p + 1);
-    jl_real *work = L + m * m;
+    jl_real *W = scratch, *GQ = W + n * n, *V = GQ + n * (p + 1);
+    jl_real *work = V + m * m;
 
     if (!within(F, n * n) || !jl_vec_within(G, n * p, JL_LARGE)
         || !within(H, m * n) || !within(w_bar, p))
@@ -73,11 +93,11 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
     status = jl_mat_check_cov(Q, work, p);
     if (status != JL_OK)
         return status;
-    status = jl_mat_check_cov(R, L, m);
+    status = jl_mat_check_cov(R, work, m);
+    if (status == JL_OK)
+        status = factor(V, R, m);
     if (status != JL_OK)
         return status;
-    if (jli_cholesky(L, R, m) != JL_OK)
-        return JL_EDEF;
     jli_mul(GQ, G, Q, n, p, p);
     jli_mul_t_sym(W, GQ, G, NULL, n, p);
     if (!jl_vec_within(W, n * n, JL_LARGE * JL_LARGE))
@@ -91,9 +111,9 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
     put(mode->F, F, n * n);
     put(mode->H, H, m * n);
     jli_copy(mode->W, W, n * n);
-    jl_mat_pack(L, R, m);               /* exactly symmetric from here on */
-    jl_mat_unpack(mode->R, L, m);
-    jl_mat_ud(mode->V, mode->R, work, m);
+    jl_mat_pack(work, R, m);            /* exactly symmetric from here on */
+    jl_mat_unpack(mode->R, work, m);
+    jli_copy(mode->V, V, m * m);
     jl_mat_ud(work, Q, work + p * p, p);
     set_noises(mode, G, work);
     return JL_OK;

@@ -61,11 +61,11 @@ static int differences(jl_real *J, function of, difference residual,
         jl_real above = x[i] + step, below = x[i] - step;
 
         at[i] = above;
-        status = of(up, at, context);
+        status = checked(of(up, at, context), up, rows);
         if (status != JL_OK)
             return status;
         at[i] = below;
-        status = of(down, at, context);
+        status = checked(of(down, at, context), down, rows);
         if (status != JL_OK)
             return status;
         at[i] = x[i];

@@ -58,7 +58,7 @@ static int turn(jl_real *y, const jl_real *x, void *context)
 static int radar(jl_real *z, const jl_real *x, void *context)
 {
     (void)context;
-    z[RANGE] = (jl_real)sqrt((double)(x[X] * x[X] + x[Y] * x[Y]));
+    z[RANGE] = jl_sqrt(x[X] * x[X] + x[Y] * x[Y]);
     z[BEARING] = jl_atan2(x[Y], x[X]);
     return z[RANGE] > 0 ? JL_OK : JL_ERANGE;
 }

@@ -805,6 +805,12 @@ static void test_filter_options_that_it_does_not_know(void **state)
             "--bogus");
     refused("jumplink filter: |unknown option -x|--help", "filter", CVCA3,
             "-x");
+    refused("unknown option -x|--help", "filter", "--form=sqrt", "-xyz",
+            CVCA3);
+    refused("unknown option -d|--help", "filter", "-d", CVCA3);
+    refused("--diagnostics=1|takes no value", "filter", "--diagnostics=1",
+            CVCA3);
+    refused("--help=1|takes no value", "filter", "--help=1", CVCA3);
     refused("jumplink filter: |--form needs a value", "filter", CVCA3,
             "--form");
     refused("jumplink filter: |-o needs a value", "filter", CVCA3, "-o");
@@ -919,7 +925,10 @@ static void test_help_names_every_option(void **state)
                  "--run --input --idle" },
         { "filter", "MODEL.json DATA.csv --out -o --filter --mode --form "
                     "--gate --gate-most --diagnostics --truth --hold --z "
-                    "--time --port --pes --timeout --lcm-url --run" },
+                    "--time --port --pes --timeout --lcm-url --run "
+                    /* columns, and what a model must have */
+                    "nis nis_mean rejected nees arrived run nan "
+                    "\"kind\": \"modes\": sigma_z sojourn_s Pi mu0 x0 P0" },
         { "host", "MODEL.json DATA.csv --out -o --filter --mode --form "
                   "--gate --gate-most --hold --z --time --pes --run --timeout "
                   "--start --lcm-url" },

@@ -82,7 +82,7 @@ static void test_gate_table_of_the_header(void **state)
         }
         rows++;
     }
-    assert_int_equal(rows, 2);
+    assert_int_equal(rows, 3);
     free(text);
 }
 

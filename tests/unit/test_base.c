@@ -1,6 +1,6 @@
-/* Status texts, and exp, log, sin, cos, atan2: swept against the C library's
- * functions of the next wider type, and by the bits that every machine must
- * find. */
+/* Status texts, and exp, log, sin, cos, sqrt, atan2: swept against the C
+ * library's functions of the next wider type, and by the bits that every
+ * machine must find. */
 #include "close.h"
 
 #include <float.h>
@@ -399,6 +399,28 @@ static void test_sincos_refuses_what_is_out_of_range(void **state)
     }
 }
 
+/* --- sqrt ---------------------------------------------------------------- */
+
+/* Half an ulp, and what the wider root it is compared with is off. */
+static void test_sqrt_is_rounded_exactly(void **state)
+{
+    const double half = 0.5 + ldexp(1.0, MANT_DIG - WIDE_DIG);
+    jl_real x, root;
+    int i;
+
+    (void)state;
+    for (i = 0; i < RANDOMS; i++) {
+        x = random_positive(JL_REAL_MIN, JL_REAL_MAX);
+        assert_true(error_in_ulp(jl_sqrt(x), W(sqrt)((wide)x)) <= half);
+    }
+    for (i = 0; i < 4000; i++) {
+        root = (jl_real)i;
+        assert_true(to_bits(jl_sqrt(root * root)) == to_bits(root));
+    }
+    assert_true(isnan((double)jl_sqrt(-1)));
+    assert_true(isnan((double)jl_sqrt((jl_real)NAN)));
+}
+
 /* --- atan2 -------------------------------------------------------------- */
 
 /* In all four quadrants, and mirrored at the diagonal. */
@@ -664,6 +686,7 @@ int main(void)
         cmocka_unit_test(test_sincos_accuracy_at_zeros_and_borders),
         cmocka_unit_test(test_sincos_keeps_the_sign_of_zero),
         cmocka_unit_test(test_sincos_refuses_what_is_out_of_range),
+        cmocka_unit_test(test_sqrt_is_rounded_exactly),
         cmocka_unit_test(test_atan2_accuracy_in_all_directions),
         cmocka_unit_test(test_atan2_accuracy_at_borders),
         cmocka_unit_test(test_atan2_accuracy_at_extreme_lengths),

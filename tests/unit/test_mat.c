@@ -467,18 +467,37 @@ static void test_mat_ud_is_unique(void **state)
         assert_close(back[i], A[i], 400 * (double)JL_EPSILON);
 }
 
-/* Two states so alike that only a little above rounding tells them apart. */
+/* Two states so alike that only a little above rounding tells them apart, or
+ * less: their difference is still not known. */
 static void test_mat_ud_keeps_what_is_small(void **state)
 {
     jl_real A[4] = { 1, 1, 1, 1 }, *S;
+    int k;
 
     (void)state;
-    A[3] = 1 + 256 * JL_EPSILON;
-    S = check_ud(A, 2, 4 * (double)JL_EPSILON);
-    assert_close(S[3] / JL_EPSILON, 256, 4);
-    A[3] = 1 + 64 * JL_EPSILON;
-    S = check_ud(A, 2, 256 * (double)JL_EPSILON);
-    assert_true(S[3] == 0);
+    for (k = 256; k >= 4; k /= 4) {
+        A[3] = 1 + (jl_real)k * JL_EPSILON;
+        S = check_ud(A, 2, 4 * (double)JL_EPSILON);
+        assert_close(S[3] / JL_EPSILON, k, k / 64);
+    }
+}
+
+/* Of three, the variances of what is left, and not the covariance. */
+static void test_mat_ud_leaves_variances(void **state)
+{
+    jl_real A[9], *S;
+    int i;
+
+    (void)state;
+    fill(A, 9, 1);
+    A[4] = A[8] = 1 + 32 * JL_EPSILON;
+    A[5] = A[7] = 1 + 8 * JL_EPSILON;
+    S = check_ud(A, 3, 9 * (double)JL_EPSILON);
+    for (i = 0; i < 3; i++)
+        assert_close(S[i], 1, 0);
+    assert_close(S[4], 32 * (double)JL_EPSILON, 0);
+    assert_close(S[5], 0, 0);
+    assert_close(S[8], 32 * (double)JL_EPSILON, 0);
 }
 
 static void test_mat_ud_extreme_scales(void **state)
@@ -789,6 +808,7 @@ int main(void)
         cmocka_unit_test(test_mat_ud_semidefinite),
         cmocka_unit_test(test_mat_ud_is_unique),
         cmocka_unit_test(test_mat_ud_keeps_what_is_small),
+        cmocka_unit_test(test_mat_ud_leaves_variances),
         cmocka_unit_test(test_mat_ud_extreme_scales),
         cmocka_unit_test(test_mat_ud_product),
         cmocka_unit_test(test_mat_pack_is_the_upper_triangle),

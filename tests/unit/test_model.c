@@ -314,6 +314,30 @@ static void test_mode_set_refuses_covariances(void **state)
     assert_int_equal(set(0), JL_OK);
 }
 
+/* The factor of R has full rank, for R has, however
+ * alike two errors are. */
+static void test_mode_set_keeps_small_pivots(void **state)
+{
+    const jl_real *V;
+
+    (void)state;
+    make(&rig, 3, 2, 2);
+    make_input(2, 2);
+    V = rig.mode.V;
+    in.R[0] = in.R[3] = 1;
+    in.R[1] = in.R[2] = 1 - 8 * JL_EPSILON;
+    assert_int_equal(set(0), JL_OK);
+    assert_close(V[0], 1, 0);
+    assert_close(V[1], 1 - 8 * EPS, 0);
+    assert_close(V[3], 16 * EPS, EPS);
+    in.R[1] = in.R[2] = 0;
+    in.R[3] = JL_REAL_MIN;
+    assert_int_equal(set(0), JL_OK);
+    assert_close(V[3], JL_REAL_MIN, 0);
+    in.R[3] = JL_REAL_MIN / 2;                  /* no row of a factor */
+    assert_int_equal(set(0), JL_EDEF);
+}
+
 /* --- motions ------------------------------------------------------------ */
 
 static jl_motion motion_of(int kind, int axes, int order, jl_real rate)
@@ -478,6 +502,44 @@ static void check_turn(int order, jl_real rate, jl_real dt)
                 assert_true(F[i * n + j] == (jl_real)(i == j && j % y == 0));
             else if (i % order == 2)
                 assert_true(F[i * n + j] == 0);
+}
+
+/* As model.h says: the motion in a mode with another sensor. */
+static void test_motion_with_another_sensor(void **state)
+{
+    static const struct { int kind, order; jl_real rate; } motions[] = {
+        { JL_MOTION_CV, 2, 0 }, { JL_MOTION_CV, 3, 0 }, { JL_MOTION_CA, 3, 0 },
+        { JL_MOTION_CT, 2, JL_C(0.1) }, { JL_MOTION_SINGER, 3, 0 }
+    };
+    static const jl_real H[3 * 6] = { 1, 2, 3, 4, 5 };
+    static const jl_real R[9] = { 4, 1, 0, 1, 9, 0, 0, 0, 1 };
+    jl_real I[6 * 6], dt;
+    size_t i;
+    int a;
+
+    (void)state;
+    for (i = 0; i < sizeof motions / sizeof *motions; i++)
+        for (dt = JL_C(0.001); dt < 2000; dt *= 7) {
+            jl_motion motion = motion_of(motions[i].kind, 2, motions[i].order,
+                                         motions[i].rate);
+            int n = 2 * motion.order;
+
+            motion.tau_s = 20;
+            make(&rig, n, 2, jl_motion_noises(&motion));
+            assert_int_equal(jl_mode_motion(&rig.mode, &motion, dt), JL_OK);
+            make(&other, n, 3, n);
+            memset(I, 0, sizeof I);
+            for (a = 0; a < n; a++)
+                I[a * (n + 1)] = 1;
+            assert_int_equal(jl_mode_set(&other.mode, rig.mode.F, I,
+                                         rig.mode.W, NULL, H, R, scratch),
+                             JL_OK);
+            assert_memory_equal(other.mode.F, rig.mode.F,
+                                (size_t)(n * n) * sizeof *I);
+            for (a = 0; a < n * n; a++)
+                assert_true(!(other.mode.W[a] < rig.mode.W[a]
+                              || other.mode.W[a] > rig.mode.W[a]));
+        }
 }
 
 static void test_motion_turn_is_an_arc(void **state)
@@ -997,8 +1059,10 @@ int main(void)
         cmocka_unit_test(test_mode_set_products),
         cmocka_unit_test(test_mode_set_refuses_nonfinite),
         cmocka_unit_test(test_mode_set_refuses_covariances),
+        cmocka_unit_test(test_mode_set_keeps_small_pivots),
         cmocka_unit_test(test_motion_closed_forms),
         cmocka_unit_test(test_motion_forgets_the_former),
+        cmocka_unit_test(test_motion_with_another_sensor),
         cmocka_unit_test(test_motion_turn_is_an_arc),
         cmocka_unit_test(test_motion_turns_over_long_gaps),
         cmocka_unit_test(test_motion_turn_keeps_the_speed),

@@ -138,6 +138,8 @@ static void residual(jl_real *d, const jl_real *a, const jl_real *b,
     struct world *w = context;
     int i;
 
+    assert_true(jl_vec_within(a, w->m, JL_REAL_MAX)
+                && jl_vec_within(b, w->m, JL_REAL_MAX));
     for (i = 0; i < w->m; i++)
         d[i] = a[i] - b[i];
     (void)told(w, RESIDUAL, d);

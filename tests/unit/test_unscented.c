@@ -628,6 +628,38 @@ static void test_unscented_refuses(void **state)
     assert_int_equal(refuses(&one), JL_OK);
 }
 
+static int bounded(jl_real *y, const jl_real *x, void *context)
+{
+    (void)context;
+    assert_true(jl_vec_within(x, 2, JL_LARGE));
+    y[0] = y[1] = 0;
+    return JL_OK;
+}
+
+/* A function is never asked about what no state can be. */
+static void test_unscented_points_are_within_bounds(void **state)
+{
+    const jl_real x[2] = { 0, JL_LARGE }, z[2] = { 0, 0 };
+    const jl_real var = JL_LARGE * JL_LARGE, wide[4] = { var, 0, 0, var };
+    const jl_real narrow[4] = { 1, 0, 0, 0 };
+    jl_nonlinear how = { bounded, NULL, bounded, NULL, NULL, NULL, 0 };
+
+    (void)state;
+    make(&rig, &jl_kf_unscented, 2, 2, x, narrow, 1, 1, &how);
+    assert_int_equal(refuses(NULL), JL_OK);
+    make(&rig, &jl_kf_unscented, 2, 2, x, narrow, 1, 1, &how);
+    assert_int_equal(refuses(z), JL_OK);
+    for (how.kappa = 0; how.kappa < 2; how.kappa++) {
+        make(&rig, &jl_kf_unscented, 2, 2, x, wide, 1, 1, &how);
+        assert_int_equal(refuses(NULL), JL_ENONFINITE);
+        assert_int_equal(refuses(z), JL_ENONFINITE);
+    }
+    how.kappa = JL_LARGE;               /* its product with a variance: inf */
+    make(&rig, &jl_kf_unscented, 2, 2, x, wide, 1, 1, &how);
+    assert_int_equal(refuses(NULL), JL_ENONFINITE);
+    assert_int_equal(refuses(z), JL_ENONFINITE);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -643,6 +675,7 @@ int main(void)
         cmocka_unit_test(test_unscented_angles_wrap),
         cmocka_unit_test(test_unscented_keeps_semidefinite),
         cmocka_unit_test(test_unscented_refuses),
+        cmocka_unit_test(test_unscented_points_are_within_bounds),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
