@@ -175,7 +175,7 @@ static jl_real difference(int c, const struct sizes_estimate *a, jl_real la,
     return most;
 }
 
-/* Both forms of everybody, beside the library's Joseph form. */
+/* All forms of everybody, beside the library's Joseph form. */
 static void check(int c)
 {
     struct sizes_filter *ours = sizes_any(new_model(c), JOSEPH);
@@ -253,7 +253,7 @@ static void time_all(void)
 
 /* --- results ------------------------------------------------------------- */
 
-static const char *const form_names[] = { "standard", "joseph" };
+static const char *const form_names[] = { "standard", "joseph", "sqrt" };
 
 static const char *case_name(int c)
 {
@@ -282,7 +282,7 @@ static void print_table(FILE *csv)
         for (f = 0; f < SIZES_FORMS; f++)
             for (w = 0; w < WHO; w++) {
                 struct samples *s = &entries[c][f][w].ns;
-                struct samples *unit = &entries[c][f][0].ns;
+                struct samples *unit = &entries[c][f == SQRT ? STANDARD : f][0].ns;
                 double least, median;
 
                 if (s->count == 0)

@@ -19,7 +19,7 @@ struct sizes_model {
     int sticky;                 /* mix as it suits Pi, if the filter can    */
 };
 
-enum sizes_form { STANDARD, JOSEPH, SIZES_FORMS };
+enum sizes_form { STANDARD, JOSEPH, SQRT, SIZES_FORMS };
 
 /* The estimate after a step: x [n], P [n,n], mu [M]. */
 struct sizes_estimate {
@@ -35,7 +35,7 @@ struct sizes_filter {
     struct sizes_estimate (*estimate)(struct sizes_filter *f);
 };
 
-/* Returns NULL where a contestant does not have the sizes.  The model must
+/* Returns NULL where a contestant does not have the sizes or the form.  The model must
  * outlive the filter; a filter is not freed. */
 typedef struct sizes_filter *sizes_make(const struct sizes_model *model,
                                         enum sizes_form form);

@@ -230,5 +230,7 @@ template <sizes_form form> sizes_filter *make(const sizes_model &model)
 
 sizes_filter *sizes_eigen(const sizes_model *model, sizes_form form)
 {
+    if (form == SQRT)
+        return nullptr;
     return form == JOSEPH ? make<JOSEPH>(*model) : make<STANDARD>(*model);
 }

@@ -14,6 +14,7 @@ struct jumplink_filter {
     jl_kf kf;
     jl_imm imm;
     jl_real *state, *scratch;
+    jl_real *P;                         /* of the Kalman filter             */
 };
 
 static struct jumplink_filter *of(struct sizes_filter *f)
@@ -56,10 +57,13 @@ static struct sizes_estimate estimate(struct sizes_filter *f)
 {
     static const jl_real one = 1;
     const struct jumplink_filter *j = of(f);
-    struct sizes_estimate kalman = { j->kf.x, j->kf.P, &one };
+    struct sizes_estimate kalman = { j->kf.x, j->P, &one };
     struct sizes_estimate imm = { j->imm.xhat, j->imm.Phat, j->imm.mu };
 
-    return j->model->kalman ? kalman : imm;
+    if (!j->model->kalman)
+        return imm;
+    jl_kf_cov(&j->kf, j->P);
+    return kalman;
 }
 
 static jl_real *reals(int count)
@@ -101,6 +105,7 @@ static struct sizes_filter *new_filter(const struct sizes_model *model,
     bench_must(f->modes != NULL, "memory");
     for (j = 0; j < M; j++)
         set_mode(&f->modes[j], model, j);
+    f->P = reals(n * n);
     f->state = reals(JL_IMM_STATE(M, n, model->m));
     f->scratch = reals(JL_IMM_SCRATCH(M, n, model->m)
                        + JL_KF_SCRATCH(n, model->m));
@@ -120,7 +125,8 @@ static struct sizes_filter *new_filter(const struct sizes_model *model,
     return &f->base;
 }
 
-static const jl_kf_form *const forms[] = { &jl_kf_standard, &jl_kf_joseph };
+static const jl_kf_form *const forms[] = { &jl_kf_standard, &jl_kf_joseph,
+                                           &jl_kf_sqrt };
 
 struct sizes_filter *sizes_any(const struct sizes_model *model,
                                enum sizes_form form)

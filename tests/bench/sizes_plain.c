@@ -269,8 +269,11 @@ struct sizes_filter *sizes_plain(const struct sizes_model *model,
                                  enum sizes_form form)
 {
     int M = model->M, n = model->n, m = model->m;
-    struct plain_filter *f = calloc(1, sizeof *f);
+    struct plain_filter *f;
 
+    if (form == SQRT)
+        return NULL;
+    f = calloc(1, sizeof *f);
     bench_must(f != NULL, "memory");
     f->base.start = start;
     f->base.step = model->kalman ? step_kalman : step_imm;
