@@ -81,7 +81,8 @@ jl_real jl_exp(jl_real x)
 {
     const jl_real bias = JLI_WHOLE + STEPS * BIAS;
     jl_real n, r, y;
-    int step, j, k;
+    jl_u32 step;
+    int j, k;
 
     if (x < LOWEST)
         return 0;
@@ -91,8 +92,8 @@ jl_real jl_exp(jl_real x)
     n = x * STEPS_PER_UNIT + bias;
     step = jli_integer(n);
     n -= bias;
-    j = step & (STEPS - 1);
-    k = step / STEPS - BIAS;
+    j = (int)(step & (STEPS - 1));
+    k = (int)(step / STEPS) - BIAS;
 
     r = (x - n * STEP_HIGH) - n * STEP_LOW;
     r = r + r * r * tail(r);

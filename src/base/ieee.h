@@ -43,12 +43,12 @@ JL_INLINE int jli_negative(jl_real x)
 }
 
 /* i of x = JLI_WHOLE + i, 0 <= i < 2^22. */
-JL_INLINE int jli_integer(jl_real x)
+JL_INLINE jl_u32 jli_integer(jl_real x)
 {
     jl_u32 word;
 
     memcpy(&word, &x, sizeof word);
-    return (int)(word & 0x3fffff);
+    return word & 0x3fffff;
 }
 
 /* x = (top + low) 2^e, x > 0, normal: 1 <= top < 2, and `digits` are those of
@@ -106,12 +106,12 @@ JL_INLINE int jli_negative(jl_real x)
     return (int)(words[jli_first_word()] >> 31);
 }
 
-JL_INLINE int jli_integer(jl_real x)
+JL_INLINE jl_u32 jli_integer(jl_real x)
 {
     jl_u32 words[2];
 
     memcpy(words, &x, sizeof words);
-    return (int)(words[!jli_first_word()] & 0x3fffff);
+    return words[!jli_first_word()] & 0x3fffff;
 }
 
 JL_INLINE int jli_split(jl_real *top, jl_real *low, jl_u32 *digits, jl_real x)
