@@ -50,7 +50,7 @@ JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
 {
     const jl_real *F = mode->F;
     jl_real *T = scratch + n * n, *U = T + n * n;
-    struct jli_squares sum = { 0, { 0 }, { 0 } };
+    struct jli_squares sum = { 0, JLI_NOUGHT, JLI_NOUGHT };
     int status;
 
     if (mode->move != NULL) {
@@ -182,7 +182,7 @@ JL_INLINE int jli_kf_update_joseph(jl_real *x, jl_real *P,
     jl_real *K = scratch, *Z = K + m * n, *S = Z + m * n, *y = S + m * m;
     jl_real *d = y + m, *r = d + m, *A = r + m, *U = A + n * n;
     jl_real *Q = U + n * n, *RK = Z;
-    struct jli_squares sum = { 0, { 0 }, { 0 } };
+    struct jli_squares sum = { 0, JLI_NOUGHT, JLI_NOUGHT };
     int i, j, ok, status;
 
     status = jli_kf_sense(innovation->nu, &H, mode, xp, z, U, n, m);
@@ -219,7 +219,7 @@ JL_INLINE int jli_kf_update_standard(jl_real *x, jl_real *P,
     const jl_real *H;
     jl_real *Z = scratch, *K = Z + m * n, *S = K + m * n, *y = S + m * m;
     jl_real *d = y + m, *rest = d + m;
-    struct jli_squares sum = { 0, { 0 }, { 0 } };
+    struct jli_squares sum = { 0, JLI_NOUGHT, JLI_NOUGHT };
     int ok, status;
 
     status = jli_kf_sense(innovation->nu, &H, mode, xp, z, rest, n, m);
