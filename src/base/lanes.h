@@ -29,8 +29,8 @@ typedef jl_real jli_pack __attribute__((vector_size(16),
 typedef jl_real jli_wide, jli_pack;
 #endif
 
-/* what(type, width, end) for columns 0 .. n - 1, the widest last: `end` is where
- * those end that are taken `width` at a time. */
+/* what(type, width, end) for columns 0 .. n - 1, the widest last: `end` is
+ * where those end that are taken `width` at a time. */
 #define JLI_BY_LANES(what, n) \
     what(jl_real, 1, (n) % JLI_PACK) \
     what(jli_pack, JLI_PACK, (n) % JLI_WIDE) \
