@@ -91,7 +91,7 @@ JL_INLINE void jli_scale(jl_real *y, jl_real a, const jl_real *x, int n)
 /* T = A', A [n,m]; stored in the pieces in which a product loads it. */
 #define JLI_GATHER(type, width, end) \
     for (; i < end; i += width) { \
-        type s = { 0 }; \
+        type s = JLI_NOUGHT; \
         for (k = 0; k < width; k++) \
             JLI_LANE(s, k) = A[(i + k) * m + j]; \
         *(type *)(T + j * n + i) = s; \
