@@ -51,7 +51,7 @@ JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
     const jl_real *F = mode->F;
     jl_real *T = scratch + n * n, *U = T + n * n;
     struct jli_squares sum = { 0 };
-    int status;
+    int i, status;
 
     if (mode->move != NULL) {
         F = scratch;
@@ -60,8 +60,11 @@ JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
             return status;
     }
     jli_transpose(T, F, n, n);
-    if (mode->move == NULL)
-        jli_row(xp, mode->u, JLI_PLUS, x, 1, T, n, n);
+    if (mode->move == NULL) {           /* u last, as jl_mode_move adds it */
+        jli_row(xp, NULL, JLI_PRODUCT, x, 1, T, n, n);
+        for (i = 0; i < n; i++)
+            xp[i] += mode->u[i];
+    }
     jli_mul(U, P, T, n, n, n);
     jli_square(&sum, xp, n);
     jli_product(Pp, mode->W, JLI_PLUS, F, n, 1, U, 1, &sum, n, n, n);
