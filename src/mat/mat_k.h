@@ -110,14 +110,26 @@ JL_INLINE void jli_transpose(jl_real *JL_RESTRICT T,
     }
 }
 
-/* Make A [n,n] symmetric by its upper triangle. */
+/* Make A [n,n] symmetric by its upper triangle.  Stored in the pieces in which
+ * a product loads it: a load of several stores has to wait for the cache. */
+#define JLI_REFLECT(type, width, end) \
+    for (; j < end; j += width) \
+        for (i = j + 1; i < n; i++) { \
+            type s = *(type *)(A + i * n + j); \
+            for (k = 0; k < width && j + k < i; k++) \
+                JLI_LANE(s, k) = A[(j + k) * n + i]; \
+            *(type *)(A + i * n + j) = s; \
+        }
+
 JL_INLINE void jli_mirror(jl_real *A, int n)
 {
-    int i, j;
+    int i, j, k;
 
-    for (i = 1; i < n; i++)
-        for (j = 0; j < i; j++)
+    for (j = 0; j < n % JLI_PACK; j++)
+        for (i = j + 1; i < n; i++)
             A[i * n + j] = A[j * n + i];
+    JLI_REFLECT(jli_pack, JLI_PACK, n % JLI_WIDE)
+    JLI_REFLECT(jli_wide, JLI_WIDE, n)
 }
 
 /* C = A B' */
