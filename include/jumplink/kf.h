@@ -90,20 +90,25 @@ typedef struct jl_innovation {
     jl_real *nu;                /* [m] z - h(x-); the caller's memory       */
 } jl_innovation;
 
-/* One step's pieces, on arrays: x [n], P [n,n] as `cov` keeps it; outputs must
- * not overlap inputs; scratch [JL_FORM_SCRATCH(n, m)].
- *     predict   returns JL_OK or JL_ENONFINITE
- *     update    *innovation is set; returns JL_OK, JL_ESINGULAR, JL_ENONFINITE
- * or the code of a nonlinear mode's function.  On error the outputs are
- * undefined, and no other array has changed; but where the nis could be had, or
- * is too large for a number (infinite, loglik then -infinite), the innovation
- * is set before JL_ENONFINITE: a gate may reject what cannot be used. */
+/* A step's pieces, on arrays: x [n], P [n,n] as `cov` keeps it, in place and
+ * unchanged on error; scratch [JL_FORM_SCRATCH(n, m)], which overlaps nothing.
+ *     predict
+ *     update    with z [m]; *innovation is set, also on error.  A nis above the
+ *               gate leaves x, P as they are; gate 0: none
+ *     step      predict, and update: the same bits in less time
+ * They return JL_OK, JL_ENONFINITE, update and step also JL_ESINGULAR, or the
+ * code of a nonlinear mode's function.  With a gate, a finite z that is too
+ * large to be used is outside: its nis is infinite, its loglik -infinite, or the
+ * nis is what it is, though x would be beyond JL_LARGE. */
 typedef struct jl_kf_form {
-    int (*predict)(jl_real *xp, jl_real *Pp, const jl_mode *mode,
-                   const jl_real *x, const jl_real *P, jl_real *scratch);
+    int (*predict)(jl_real *x, jl_real *P, const jl_mode *mode,
+                   jl_real *scratch);
     int (*update)(jl_real *x, jl_real *P, jl_innovation *innovation,
-                  const jl_mode *mode, const jl_real *xp, const jl_real *Pp,
-                  const jl_real *z, jl_real *scratch);
+                  const jl_mode *mode, const jl_real *z, jl_real gate,
+                  jl_real *scratch);
+    int (*step)(jl_real *x, jl_real *P, jl_innovation *innovation,
+                const jl_mode *mode, const jl_real *z, jl_real gate,
+                jl_real *scratch);
     const jl_cov *cov;
     int n, m;                   /* the sizes it is for; 0: any              */
 } jl_kf_form;
@@ -145,7 +150,7 @@ extern const jl_kf_form jl_kf_unscented;        /* sigma points; factors    */
 const jl_kf_form *jl_kf_fixed(const jl_kf_form *form, int n, int m);
 
 #define JL_FORM_SCRATCH(n, m) \
-    (3 * (n) * (n) + 4 * (n) * (m) + 2 * (m) * (m) + 5 * ((n) + (m)))
+    (5 * (n) * (n) + 4 * (n) * (m) + 2 * (m) * (m) + 7 * (n) + 5 * (m))
 
 /* --- the filter -------------------------------------------------------- */
 
@@ -158,8 +163,7 @@ enum {                          /* the verdict on a measurement */
 /* Reals of state (x, P, nu) and of scratch.  Scratch means nothing between
  * calls and may be shared by all filters of a thread. */
 #define JL_KF_STATE(n, m) ((n) + (n) * (n) + (m))
-#define JL_KF_SCRATCH(n, m) \
-    (2 * ((n) + (n) * (n)) + (m) + JL_FORM_SCRATCH(n, m))
+#define JL_KF_SCRATCH(n, m) ((m) + JL_FORM_SCRATCH(n, m))
 
 typedef struct jl_kf {
     const jl_mode *mode;

@@ -11,7 +11,7 @@ int jl_imm_gate(jl_imm *imm, jl_real nis, int most)
     return JL_OK;
 }
 
-static int is_possible(const jl_imm *imm, int j)
+int jli_is_possible(const jl_imm *imm, int j)
 {
     return imm->logc[j] >= -JL_REAL_MAX;
 }
@@ -21,9 +21,9 @@ static int rejects(const jl_imm *imm, int j)
     return imm->gate > 0 && imm->nis[j] > imm->gate;
 }
 
-int jli_imm_waits(const jl_imm *imm, int j)
+static int waits(const jl_imm *imm, int j)
 {
-    return rejects(imm, j) || (imm->gate > 0 && !is_possible(imm, j));
+    return rejects(imm, j) || (imm->gate > 0 && !jli_is_possible(imm, j));
 }
 
 /* Every mode that is possible rejects, and not too often in a row, unless one
@@ -33,7 +33,7 @@ static int all_reject(const jl_imm *imm)
     int j, unusable = 0;
 
     for (j = 0; j < imm->M; j++)
-        if (is_possible(imm, j)) {
+        if (jli_is_possible(imm, j)) {
             if (!rejects(imm, j))
                 return 0;
             unusable |= imm->l[j] < -JL_REAL_MAX;
@@ -57,7 +57,7 @@ int jl_imm_judge(jl_imm *imm, const jl_real *z, jl_real *scratch)
     for (j = 0; j < imm->M && status == JL_OK; j++) {
         if (imm->verdict != JL_ACCEPTED)
             imm->l[j] = 0;
-        else if (jli_imm_waits(imm, j))
+        else if (waits(imm, j))
             status = jli_imm_update(imm, j, z, 0, scratch);
     }
     return status;

@@ -18,7 +18,7 @@ enum {
 #if JL_REAL_FLOAT
 #define jli_log_sum_exp jli_log_sum_exp_f32
 #define jli_imm_update jli_imm_update_f32
-#define jli_imm_waits jli_imm_waits_f32
+#define jli_is_possible jli_is_possible_f32
 #define jli_check_sizes jli_check_sizes_f32
 #define jli_own_states jli_own_states_f32
 #define jli_all_states jli_all_states_f32
@@ -28,13 +28,14 @@ enum {
  * exp(v - max), *sum is the sum of those. */
 jl_real jli_log_sum_exp(jl_real *v, int n, jl_real *sum);
 
-/* Update mode j in xw, Pw; with a gate, unless it waits for the verdict. */
+/* 1 if mode j can be entered. */
+int jli_is_possible(const jl_imm *imm, int j);
+
+/* Update mode j in xw, Pw.  With a gate, a mode outside it stays as it is, until
+ * all know that the measurement is accepted; so does one that is impossible, and
+ * has no say. */
 int jli_imm_update(jl_imm *imm, int j, const jl_real *z, jl_real gate,
                    jl_real *scratch);
-
-/* 1 if mode j is updated only when all know that the measurement is accepted:
- * it is outside its gate; or the mode is impossible, and has no say. */
-int jli_imm_waits(const jl_imm *imm, int j);
 
 /* --- modes of different states (imm_sizes.c) ------------------------------ */
 

@@ -1,84 +1,94 @@
 /* Stages 2 and 3, and the four in one. */
 #include "imm/imm_stage.h"
 
-#include "kf/kf_gate.h"
 #include "mat/mat_k.h"
 
-/* Where a mode's own estimate is, and where what becomes of it goes first. */
-struct place {
-    const jl_real *x, *P;       /* [k], [k,k]                               */
-    jl_real *new_x, *new_P;
+/* A mode's own estimate: in xw, Pw; if it lacks components, or when it is to be
+ * left as it is, a copy in scratch. */
+struct own {
+    jl_real *x, *P;             /* [k], [k,k]                               */
     jl_real *rest;              /* scratch                                  */
 };
 
-static struct place own(const jl_imm *imm, int j, jl_real *scratch)
+static struct own take(const jl_imm *imm, int j, int aside, jl_real *scratch)
 {
     int n = imm->n, k = imm->modes[j].n;
-    struct place p;
+    jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
+    struct own own;
 
-    p.new_x = scratch;
-    p.new_P = p.new_x + k;
-    p.rest = p.new_P + k * k;
-    p.x = imm->xw + j * n;
-    p.P = imm->Pw + j * n * n;
+    own.x = scratch;
+    own.P = own.x + k;
+    own.rest = own.P + k * k;
     if (JLI_LACKS(imm, j)) {
-        jl_real *x = p.rest, *P = x + k;
-
-        jli_own_states(x, P, imm, j, p.x, p.P, P + k * k);
-        p.x = x;
-        p.P = P;
-        p.rest = P + k * k;
+        jli_own_states(own.x, own.P, imm, j, x, P, own.rest);
+    } else if (aside) {
+        jli_copy(own.x, x, n);
+        jli_copy(own.P, P, n * n);
+    } else {
+        own.x = x;
+        own.P = P;
+        own.rest = scratch;
     }
-    return p;
+    return own;
 }
 
-static void put_back(jl_imm *imm, int j, const struct place *p)
+static void give(jl_imm *imm, int j, const struct own *own)
 {
     int n = imm->n;
-    jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
 
-    if (JLI_LACKS(imm, j)) {
-        jli_all_states(x, P, imm, j, p->new_x, p->new_P);
-    } else {
-        jli_copy(x, p->new_x, n);
-        jli_copy(P, p->new_P, n * n);
-    }
+    if (JLI_LACKS(imm, j))
+        jli_all_states(imm->xw + j * n, imm->Pw + j * n * n, imm, j, own->x,
+                       own->P);
+}
+
+static int fail(jl_imm *imm, int status)
+{
+    imm->stage = JLI_FAILED;
+    return status;
 }
 
 int jl_imm_predict_mode(jl_imm *imm, int j, jl_real *scratch)
 {
-    struct place p = own(imm, j, scratch);
+    struct own own = take(imm, j, 0, scratch);
     int status;
 
     JL_ASSERT(j >= 0 && j < imm->M);
-    status = imm->form->predict(p.new_x, p.new_P, &imm->modes[j], p.x, p.P,
-                                p.rest);
-    if (status == JL_OK)
-        put_back(imm, j, &p);
-    else
-        imm->stage = JLI_FAILED;
-    return status;
+    status = imm->form->predict(own.x, own.P, &imm->modes[j], own.rest);
+    if (status != JL_OK)
+        return fail(imm, status);
+    give(imm, j, &own);
+    return JL_OK;
+}
+
+/* 1 if mode j must not be updated before the verdict, whatever its nis. */
+static int has_no_say(const jl_imm *imm, int j, jl_real gate)
+{
+    return gate > 0 && !jli_is_possible(imm, j);
+}
+
+static int told(jl_imm *imm, int j, int status, const jl_innovation *got)
+{
+    if (status != JL_OK)
+        return fail(imm, status);
+    imm->l[j] = got->loglik;
+    imm->nis[j] = got->nis;
+    return JL_OK;
 }
 
 int jli_imm_update(jl_imm *imm, int j, const jl_real *z, jl_real gate,
                    jl_real *scratch)
 {
-    struct place p = own(imm, j, scratch);
+    int aside = has_no_say(imm, j, gate), status;
+    struct own own = take(imm, j, aside, scratch);
     jl_innovation got;
-    int status;
 
     got.nu = imm->nu + j * imm->m;
-    status = jli_gated_update(p.new_x, p.new_P, &got, imm->form,
-                              &imm->modes[j], p.x, p.P, z, gate, p.rest);
-    if (status != JL_OK) {
-        imm->stage = JLI_FAILED;
-        return status;
-    }
-    imm->l[j] = got.loglik;
-    imm->nis[j] = got.nis;
-    if (!(gate > 0 && jli_imm_waits(imm, j)))
-        put_back(imm, j, &p);
-    return JL_OK;
+    status = told(imm, j, imm->form->update(own.x, own.P, &got,
+                                            &imm->modes[j], z, gate,
+                                            own.rest), &got);
+    if (status == JL_OK && !aside)
+        give(imm, j, &own);
+    return status;
 }
 
 int jl_imm_update_mode(jl_imm *imm, int j, const jl_real *z,
@@ -95,34 +105,22 @@ int jl_imm_update_mode(jl_imm *imm, int j, const jl_real *z,
     return jli_imm_update(imm, j, z, imm->gate, scratch);
 }
 
-/* Predict and update in one: from xw into scratch, and back. */
+/* Predict and update in one, where a mode may. */
 static int filter_mode(jl_imm *imm, int j, const jl_real *z, jl_real *scratch)
 {
-    const jl_mode *mode = &imm->modes[j];
     int n = imm->n, status;
-    jl_real *x = imm->xw + j * n, *P = imm->Pw + j * n * n;
-    jl_real *xp = scratch, *Pp = xp + n, *rest = Pp + n * n;
     jl_innovation got;
 
+    if (z == NULL || JLI_LACKS(imm, j) || has_no_say(imm, j, imm->gate)) {
+        status = jl_imm_predict_mode(imm, j, scratch);
+        return status == JL_OK ? jl_imm_update_mode(imm, j, z, scratch)
+            : status;
+    }
     got.nu = imm->nu + j * imm->m;
-    status = imm->form->predict(xp, Pp, mode, x, P, rest);
-    if (status == JL_OK)
-        status = imm->gate > 0
-            ? jli_gated_update(x, P, &got, imm->form, mode, xp, Pp, z,
-                               imm->gate, rest)
-            : imm->form->update(x, P, &got, mode, xp, Pp, z, rest);
-    if (status != JL_OK) {
-        imm->stage = JLI_FAILED;
-        return status;
-    }
     imm->stage = JLI_FILTERED;
-    imm->l[j] = got.loglik;
-    imm->nis[j] = got.nis;
-    if (imm->gate > 0 && jli_imm_waits(imm, j)) {
-        jli_copy(x, xp, n);
-        jli_copy(P, Pp, n * n);
-    }
-    return JL_OK;
+    status = imm->form->step(imm->xw + j * n, imm->Pw + j * n * n, &got,
+                             &imm->modes[j], z, imm->gate, scratch);
+    return told(imm, j, status, &got);
 }
 
 int jl_imm_filter(jl_imm *imm, const jl_real *z, jl_real *scratch)
@@ -131,15 +129,8 @@ int jl_imm_filter(jl_imm *imm, const jl_real *z, jl_real *scratch)
 
     if (imm->stage != JLI_MIXED)
         return JL_EORDER;
-    for (j = 0; j < imm->M && status == JL_OK; j++) {
-        if (z != NULL && !JLI_LACKS(imm, j)) {
-            status = filter_mode(imm, j, z, scratch);
-            continue;
-        }
-        status = jl_imm_predict_mode(imm, j, scratch);
-        if (status == JL_OK)
-            status = jl_imm_update_mode(imm, j, z, scratch);
-    }
+    for (j = 0; j < imm->M && status == JL_OK; j++)
+        status = filter_mode(imm, j, z, scratch);
     return status == JL_OK ? jl_imm_judge(imm, z, scratch) : status;
 }
 

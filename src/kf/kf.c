@@ -1,6 +1,6 @@
 /* The Kalman filter as an object: a form's steps, committed when they went
  * well. */
-#include "kf/kf_gate.h"
+#include "jumplink/kf.h"
 
 #include "mat/mat_k.h"
 
@@ -62,15 +62,7 @@ void jl_kf_cov(const jl_kf *kf, jl_real *P)
 
 int jl_kf_predict(jl_kf *kf, jl_real *scratch)
 {
-    int n = kf->mode->n, size = n + n * n, status;
-    jl_real *before = scratch;
-
-    jli_copy(before, kf->x, size);              /* x and P */
-    status = kf->form->predict(kf->x, kf->P, kf->mode, before, before + n,
-                               before + size);
-    if (status != JL_OK)
-        jli_copy(kf->x, before, size);
-    return status;
+    return kf->form->predict(kf->x, kf->P, kf->mode, scratch);
 }
 
 /* Above this nis a measurement is rejected; 0: never. */
@@ -79,78 +71,73 @@ static jl_real limit(const jl_kf *kf)
     return kf->gate > 0 && kf->run >= kf->most ? JL_REAL_MAX : kf->gate;
 }
 
-/* Counts stay where they are as large as can be: a mean divides by one, and one
- * that is signed must not overflow. */
-static void count(jl_kf *kf, const jl_innovation *got)
+/* Without a measurement. */
+static void miss(jl_kf *kf, jl_real *loglik)
+{
+    kf->verdict = JL_MISSING;
+    if (loglik != NULL)
+        *loglik = 0;
+}
+
+/* With one, of which the form told `got`.  Counts stay where they are as large
+ * as can be: a mean divides by one, and one that is signed must not overflow. */
+static void count(jl_kf *kf, jl_real *loglik, const jl_innovation *got)
 {
     jl_real *nu = kf->innovation.nu;
+    int rejected = kf->gate > 0 && got->nis > limit(kf), a;
 
-    jli_copy(nu, got->nu, kf->mode->m);
+    for (a = 0; a < kf->mode->m; a++)
+        nu[a] = got->nu[a];
     kf->innovation = *got;
     kf->innovation.nu = nu;
-    if (kf->verdict == JL_REJECTED) {
+    if (rejected) {
+        kf->verdict = JL_REJECTED;
         kf->run += kf->run < INT_MAX;
         kf->rejected++;
     } else {
+        kf->verdict = JL_ACCEPTED;
         kf->run = 0;
         kf->accepted += kf->accepted < ULONG_MAX;
         kf->nis_mean += (got->nis - kf->nis_mean) / (jl_real)kf->accepted;
     }
-}
-
-/* The prediction xp [n + n n], and z or NULL, become the estimate.  The update
- * writes it where it is kept, so that the next step need not wait for a copy;
- * on failure it is again what is in `before`. */
-static int absorb(jl_kf *kf, jl_real *loglik, const jl_real *xp,
-                  const jl_real *before, const jl_real *z, jl_real *scratch)
-{
-    int n = kf->mode->n, size = n + n * n, status, verdict = JL_MISSING;
-    jl_real *nu = scratch, gate = limit(kf);
-    jl_innovation got;
-
-    if (z != NULL) {
-        jl_real *rest = nu + kf->mode->m;
-
-        got.nu = nu;
-        status = gate > 0
-            ? jli_gated_update(kf->x, kf->P, &got, kf->form, kf->mode, xp,
-                               xp + n, z, gate, rest)
-            : kf->form->update(kf->x, kf->P, &got, kf->mode, xp, xp + n, z,
-                               rest);
-        if (status != JL_OK) {
-            jli_copy(kf->x, before, size);
-            return status;
-        }
-        verdict = gate > 0 && got.nis > gate ? JL_REJECTED : JL_ACCEPTED;
-    }
-    kf->verdict = verdict;
-    if (z != NULL)
-        count(kf, &got);
-    if (verdict != JL_ACCEPTED)
-        jli_copy(kf->x, xp, size);
     if (loglik != NULL)
-        *loglik = verdict == JL_ACCEPTED ? got.loglik : 0;
-    return JL_OK;
+        *loglik = rejected ? 0 : got->loglik;
 }
 
 int jl_kf_update(jl_kf *kf, jl_real *loglik, const jl_real *z,
                  jl_real *scratch)
 {
-    int n = kf->mode->n, size = n + n * n;
+    jl_innovation got;
+    int status;
 
-    jli_copy(scratch, kf->x, size);
-    return absorb(kf, loglik, scratch, scratch, z, scratch + size);
+    if (z == NULL) {
+        miss(kf, loglik);
+        return JL_OK;
+    }
+    got.nu = scratch;
+    status = kf->form->update(kf->x, kf->P, &got, kf->mode, z, limit(kf),
+                              scratch + kf->mode->m);
+    if (status == JL_OK)
+        count(kf, loglik, &got);
+    return status;
 }
 
 int jl_kf_step(jl_kf *kf, jl_real *loglik, const jl_real *z,
                jl_real *scratch)
 {
-    int n = kf->mode->n, size = n + n * n, status;
-    jl_real *before = scratch, *xp = before + size, *rest = xp + size;
+    jl_innovation got;
+    int status;
 
-    status = kf->form->predict(xp, xp + n, kf->mode, kf->x, kf->P, rest);
-    if (status != JL_OK)
+    if (z == NULL) {
+        status = jl_kf_predict(kf, scratch);
+        if (status == JL_OK)
+            miss(kf, loglik);
         return status;
-    jli_copy(before, kf->x, size);
-    return absorb(kf, loglik, xp, before, z, rest);
+    }
+    got.nu = scratch;
+    status = kf->form->step(kf->x, kf->P, &got, kf->mode, z, limit(kf),
+                            scratch + kf->mode->m);
+    if (status == JL_OK)
+        count(kf, loglik, &got);
+    return status;
 }

@@ -19,6 +19,7 @@
  * usual 1e-3 puts the points within 1e-3 sigma, where the weights are -1e6 and
  * 1e6 / 2n, float differences have lost their digits, and a covariance is what
  * is left of 1e6 times itself. */
+#include "kf/kf_form.h"
 #include "kf/sqrt_k.h"
 
 /* A function of a mode's, n states to m values. */
@@ -127,15 +128,16 @@ static void bend(jl_real *T, jl_real *shift, jl_real *b, const struct map *f)
 
 /* scratch [2 n n + n] */
 static int predict(jl_real *xp, jl_real *Sp, const jl_mode *mode,
-                   const jl_real *x, const jl_real *S, jl_real *scratch)
+                   const jl_real *x, const jl_real *S, jl_real *scratch,
+                   int n)
 {
     const jl_nonlinear *nl = mode->nonlinear;
-    int n = mode->n, i, k, status;
+    int i, k, status;
     jl_real *a = scratch, *b = a + n * n, *shift = b + n * n;
     struct map f;
 
     if (nl == NULL || nl->f == NULL)
-        return jl_kf_sqrt.predict(xp, Sp, mode, x, S, scratch);
+        return jli_sqrt_predict(xp, Sp, mode, x, S, scratch, n);
     f.of = nl->f;
     f.residual = NULL;
     f.context = nl->context;
@@ -217,16 +219,17 @@ static int condition(jl_real *x, jl_real *S, jl_innovation *innovation,
 /* scratch [n n + 4 n m + 2 m m + m + n] */
 static int update(jl_real *x, jl_real *S, jl_innovation *innovation,
                   const jl_mode *mode, const jl_real *xp, const jl_real *Sp,
-                  const jl_real *z, jl_real *scratch)
+                  const jl_real *z, jl_real *scratch, int n, int m)
 {
     const jl_nonlinear *nl = mode->nonlinear;
-    int n = mode->n, m = mode->m, status;
+    int status;
     jl_real *a = scratch, *b = a + n * m, *V = b + n * m, *T = V + m * m;
     jl_real *v = T + (m + n) * (m + n), *nu = innovation->nu;
     struct map h;
 
     if (nl == NULL || nl->h == NULL)
-        return jl_kf_sqrt.update(x, S, innovation, mode, xp, Sp, z, scratch);
+        return jli_sqrt_update(x, S, innovation, mode, xp, Sp, z, scratch, n,
+                               m);
     if (!jl_vec_within(z, m, JL_LARGE))
         return JL_ENONFINITE;
     h.of = nl->h;
@@ -251,4 +254,8 @@ static int update(jl_real *x, jl_real *S, jl_innovation *innovation,
     return condition(x, S, innovation, T, xp, v, n, m);
 }
 
-const jl_kf_form jl_kf_unscented = { predict, update, &jl_cov_ud, 0, 0 };
+JLI_FORM_FUNCTIONS(unscented, predict, update, mode->n, mode->m)
+
+const jl_kf_form jl_kf_unscented = {
+    unscented_predict, unscented_update, unscented_step, &jl_cov_ud, 0, 0
+};

@@ -88,6 +88,19 @@ JL_INLINE void jli_scale(jl_real *y, jl_real a, const jl_real *x, int n)
     JLI_BY_LANES(JLI_SCALE, n)
 }
 
+/* B = A [n,m], in the pieces in which a product stores it */
+#define JLI_MOVE(type, width, end) \
+    for (; j < end; j += width) \
+        for (i = 0; i < n; i++) \
+            *(type *)(B + i * m + j) = *(const type *)(A + i * m + j);
+
+JL_INLINE void jli_move(jl_real *B, const jl_real *A, int n, int m)
+{
+    int i, j = 0;
+
+    JLI_BY_LANES(JLI_MOVE, m)
+}
+
 /* T = A', A [n,m]; stored in the pieces in which a product loads it. */
 #define JLI_GATHER(type, width, end) \
     for (; i < end; i += width) { \

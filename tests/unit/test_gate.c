@@ -410,30 +410,29 @@ static void test_kf_gate_where_nis_is_no_number(void **state)
 }
 
 /* A mode's function that has no value, say. */
-static int no_value(jl_real *x, jl_real *P, jl_innovation *innovation,
-                    const jl_mode *mode, const jl_real *xp, const jl_real *Pp,
-                    const jl_real *z, jl_real *work)
+static int no_value(jl_real *y, const jl_real *x, void *context)
 {
-    (void)x, (void)P, (void)innovation, (void)mode, (void)xp, (void)Pp;
-    (void)z, (void)work;
+    (void)y, (void)x, (void)context;
     return JL_ENONFINITE;
 }
 
 /* That is not the measurement's fault: an error, gate or no gate. */
 static void test_kf_gate_and_updates_without_nis(void **state)
 {
-    static jl_kf_form form;
+    static jl_nonlinear blind;
     jl_real z = 1000;
+    int f;
 
     (void)state;
-    make(&rig, &jl_kf_joseph);
-    jl_kf_gate(&rig.kf, GATE, 5);
-    step(&rig, &z);
-    check_counts(&rig, JL_REJECTED, 1, 1, 0);
-    form = jl_kf_joseph;
-    form.update = no_value;
-    rig.kf.form = &form;
-    step_fails(&rig, &z, JL_ENONFINITE);
+    blind.h = no_value;
+    for (f = 0; f < FORMS; f++) {
+        make(&rig, forms[f]);
+        jl_kf_gate(&rig.kf, GATE, 5);
+        step(&rig, &z);
+        check_counts(&rig, JL_REJECTED, 1, 1, 0);
+        assert_int_equal(jl_mode_nonlinear(&rig.mode, &blind), JL_OK);
+        step_fails(&rig, &z, JL_ENONFINITE);
+    }
 }
 
 /* Without a gate they are an error, or ruin the filter if they can be used. */

@@ -565,16 +565,15 @@ static void test_kf_step_is_predict_and_update(void **state)
 
             for (i = 0; i < 3; i++)
                 z[i] = rnd();
-            /* the pieces of the form, which read and write apart */
-            memcpy(&before, &twin, sizeof twin);
+            /* the pieces of the form */
+            memcpy(pred, twin.kf.x, sizeof pred);
             assert_int_equal(forms[f]->predict(pred, pred + 4, &rig.mode,
-                                               twin.kf.x, twin.kf.P,
                                                spoilt(&rig)), JL_OK);
-            assert_int_equal(forms[f]->update(out, out + 4, &got,
-                                              &rig.mode, pred, pred + 4, z,
-                                              spoilt(&rig)), JL_OK);
             check_edges(&rig);
-            assert_same_bits(&twin, &before, sizeof twin);
+            memcpy(out, pred, sizeof pred);
+            assert_int_equal(forms[f]->update(out, out + 4, &got, &rig.mode,
+                                              z, 0, spoilt(&rig)), JL_OK);
+            check_edges(&rig);
             assert_int_equal(jl_kf_predict(&twin.kf, spoilt(&twin)), JL_OK);
             assert_same_bits(twin.kf.x, pred, 4 * sizeof *pred);
             assert_same_bits(twin.kf.P, pred + 4, 16 * sizeof *pred);
@@ -704,31 +703,34 @@ static void test_kf_refuses_z_beyond_large(void **state)
     }
 }
 
-/* A form keeps to its scratch, whose size is the header's, and to the sizes of
- * its outputs. */
+/* A form keeps to its scratch, whose size is the header's, and to x, P, nu. */
 static void check_form_edges(const jl_kf_form *form, int n, int m)
 {
     static jl_real x[MAX + 2 * EDGE], P[MAX * MAX + 2 * EDGE], z[MAX];
     static jl_real nu[MAX + 2 * EDGE];
     jl_innovation got;
-    int i, step;
+    int i, call;
 
     make(&rig, form, n, m);
     for (i = 0; i < m; i++)
         z[i] = rnd();
-    for (step = 0; step < 2; step++) {
+    for (call = PREDICT; call <= STEP; call++) {
         for (i = 0; i < JL_FORM_SCRATCH(n, m) + 2 * EDGE; i++)
             scratch[i] = NAN_;
         for (i = 0; i < MAX + 2 * EDGE; i++)
             x[i] = nu[i] = NAN_;
         for (i = 0; i < MAX * MAX + 2 * EDGE; i++)
             P[i] = NAN_;
+        memcpy(x + EDGE, rig.kf.x, (size_t)n * sizeof *x);
+        memcpy(P + EDGE, rig.kf.P, (size_t)(n * n) * sizeof *P);
         got.nu = nu + EDGE;
-        assert_int_equal(step == 0
-            ? form->predict(x + EDGE, P + EDGE, &rig.mode, rig.kf.x,
-                            rig.kf.P, scratch + EDGE)
-            : form->update(x + EDGE, P + EDGE, &got, &rig.mode, rig.kf.x,
-                           rig.kf.P, z, scratch + EDGE), JL_OK);
+        assert_int_equal(call == PREDICT
+            ? form->predict(x + EDGE, P + EDGE, &rig.mode, scratch + EDGE)
+            : call == UPDATE
+            ? form->update(x + EDGE, P + EDGE, &got, &rig.mode, z, 0,
+                           scratch + EDGE)
+            : form->step(x + EDGE, P + EDGE, &got, &rig.mode, z, 0,
+                         scratch + EDGE), JL_OK);
         for (i = 0; i < EDGE; i++) {
             assert_true(isnan(scratch[i]) && isnan(x[i]) && isnan(P[i]));
             assert_true(isnan(scratch[EDGE + JL_FORM_SCRATCH(n, m) + i]));
@@ -754,11 +756,11 @@ static void test_kf_form_keeps_to_its_scratch(void **state)
     }
 }
 
-/* A form that fails may have written its outputs, but nothing else. */
+/* A form that fails leaves the estimate, and all else, as it was. */
 static void test_kf_form_fails_alone(void **state)
 {
     const jl_real z[2] = { NAN_, 1 };
-    jl_real out[JL_KF_STATE(3, 3)], nu[2];
+    jl_real nu[2];
     jl_innovation got;
     int f;
 
@@ -767,9 +769,11 @@ static void test_kf_form_fails_alone(void **state)
     for (f = 0; f < FORMS; f++) {
         make(&rig, forms[f], 3, 2);
         memcpy(&before, &rig, sizeof rig);
-        assert_int_equal(forms[f]->update(out, out + 3, &got, &rig.mode,
-                                          rig.kf.x, rig.kf.P, z,
-                                          spoilt(&rig)), JL_ENONFINITE);
+        assert_int_equal(forms[f]->update(rig.kf.x, rig.kf.P, &got, &rig.mode,
+                                          z, 0, spoilt(&rig)), JL_ENONFINITE);
+        check_edges(&rig);
+        assert_int_equal(forms[f]->step(rig.kf.x, rig.kf.P, &got, &rig.mode,
+                                        z, 0, spoilt(&rig)), JL_ENONFINITE);
         check_edges(&rig);
         assert_same_bits(&rig, &before, sizeof rig);
     }
