@@ -25,7 +25,7 @@
     }
 
 #define FORM(form, predict, update, cov, N, M) \
-    JLI_FORM_FUNCTIONS(form##_##N##_##M, predict, update, N, M) \
+    JLI_FORM_FUNCTIONS(form##_##N##_##M, predict, update, N, M, N / M, N / M) \
     const jl_kf_form JL_KF_FIXED(form, N, M) = { \
         form##_##N##_##M##_predict, form##_##N##_##M##_update, \
         form##_##N##_##M##_step, &cov##_##N##_##M, N, M \

@@ -129,7 +129,7 @@ static void bend(jl_real *T, jl_real *shift, jl_real *b, const struct map *f)
 /* scratch [2 n n + n] */
 static int predict(jl_real *xp, jl_real *Sp, const jl_mode *mode,
                    const jl_real *x, const jl_real *S, jl_real *scratch,
-                   int n)
+                   int n, int block)
 {
     const jl_nonlinear *nl = mode->nonlinear;
     int i, k, status;
@@ -137,7 +137,7 @@ static int predict(jl_real *xp, jl_real *Sp, const jl_mode *mode,
     struct map f;
 
     if (nl == NULL || nl->f == NULL)
-        return jli_sqrt_predict(xp, Sp, mode, x, S, scratch, n);
+        return jli_sqrt_predict(xp, Sp, mode, x, S, scratch, n, block);
     f.of = nl->f;
     f.residual = NULL;
     f.context = nl->context;
@@ -219,7 +219,7 @@ static int condition(jl_real *x, jl_real *S, jl_innovation *innovation,
 /* scratch [n n + 4 n m + 2 m m + m + n] */
 static int update(jl_real *x, jl_real *S, jl_innovation *innovation,
                   const jl_mode *mode, const jl_real *xp, const jl_real *Sp,
-                  const jl_real *z, jl_real *scratch, int n, int m)
+                  const jl_real *z, jl_real *scratch, int n, int m, int e)
 {
     const jl_nonlinear *nl = mode->nonlinear;
     int status;
@@ -229,7 +229,7 @@ static int update(jl_real *x, jl_real *S, jl_innovation *innovation,
 
     if (nl == NULL || nl->h == NULL)
         return jli_sqrt_update(x, S, innovation, mode, xp, Sp, z, scratch, n,
-                               m);
+                               m, e);
     if (!jl_vec_within(z, m, JL_LARGE))
         return JL_ENONFINITE;
     h.of = nl->h;
@@ -254,7 +254,8 @@ static int update(jl_real *x, jl_real *S, jl_innovation *innovation,
     return condition(x, S, innovation, T, xp, v, n, m);
 }
 
-JLI_FORM_FUNCTIONS(unscented, predict, update, mode->n, mode->m)
+JLI_FORM_FUNCTIONS(unscented, predict, update, mode->n, mode->m,
+                   mode->block, mode->every)
 
 const jl_kf_form jl_kf_unscented = {
     unscented_predict, unscented_update, unscented_step, &jl_cov_ud, 0, 0

@@ -30,12 +30,13 @@ JL_INLINE int jli_factor_ok(const jl_real *x, const jl_real *S, int n)
  * scratch [n n + 3 n] */
 JL_INLINE int jli_sqrt_predict(jl_real *xp, jl_real *Sp, const jl_mode *mode,
                                const jl_real *x, const jl_real *S,
-                               jl_real *scratch, int n)
+                               jl_real *scratch, int n, int b)
 {
     const jl_real *F = mode->F;
     jl_real *v = scratch + n * n;
     int i, j, k, status;
 
+    (void)b;
     if (mode->move != NULL) {
         F = scratch;
         status = mode->move(xp, scratch, mode, x, v);
@@ -84,17 +85,19 @@ JL_INLINE void jli_whiten(jl_real *H, jl_real *nu, const jl_real *V, int a,
 JL_INLINE int jli_sqrt_update(jl_real *x, jl_real *S,
                               jl_innovation *innovation, const jl_mode *mode,
                               const jl_real *xp, const jl_real *Sp,
-                              const jl_real *z, jl_real *scratch, int n, int m)
+                              const jl_real *z, jl_real *scratch, int n, int m,
+                              int e)
 {
-    const jl_real *given;
+    struct jli_sensor sensor;
     jl_real *H = scratch, *y = H + m * n, *K = y + m;
     jl_real twice = (jl_real)m * JLI_LOG_2PI;
     int i, a, status;
 
-    status = jli_kf_sense(innovation->nu, &given, mode, xp, z, K + n, n, m);
+    status = jli_kf_sense(innovation->nu, &sensor, mode, xp, z, K + n, n, m,
+                          e);
     if (status != JL_OK)
         return status;
-    jli_copy(H, given, m * n);
+    jli_copy(H, sensor.H, m * n);
     jli_copy(y, innovation->nu, m);
     jli_copy(x, xp, n);
     jli_copy(S, Sp, n * n);

@@ -189,9 +189,9 @@ JL_INLINE void jli_apply(jl_real *y, const jl_real *A, const jl_real *x,
     int i, k;
 
     for (i = 0; i < n; i++) {
-        jl_real s = 0;
+        jl_real s = A[i * m] * x[0];
 
-        for (k = 0; k < m; k++)
+        for (k = 1; k < m; k++)
             s += A[i * m + k] * x[k];
         y[i] = b != NULL ? s + b[i] : s;
     }

@@ -1,5 +1,5 @@
 /* Modes given by matrices. */
-#include "jumplink/model.h"
+#include "model/structure.h"
 
 #include "mat/mat_k.h"
 
@@ -25,6 +25,8 @@ int jl_mode_init(jl_mode *mode, int n, int m, int p, jl_real *mem, int cap)
     mode->nonlinear = NULL;
     mode->move = NULL;
     mode->sense = NULL;
+    mode->block = n;            /* anything may be put there by hand */
+    mode->every = 0;
     return JL_OK;
 }
 
@@ -116,5 +118,6 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
     jli_copy(mode->V, V, m * m);
     jl_mat_ud(work, Q, work + p * p, p);
     set_noises(mode, G, work);
+    jli_mode_structure(mode);
     return JL_OK;
 }

@@ -2,7 +2,8 @@
 #include "jumplink/model.h"
 
 #include "mat/mat_k.h"
-#include "singer.h"
+#include "model/singer.h"
+#include "model/structure.h"
 
 static int motion_sizes(const jl_motion *motion)
 {
@@ -188,6 +189,7 @@ int jl_mode_motion(jl_mode *mode, const jl_motion *motion, jl_real dt)
         mode->R[a * m + a] = motion->sigma_z * motion->sigma_z;
         mode->V[a * m + a] = mode->R[a * m + a];
     }
+    jli_mode_structure(mode);
     return JL_OK;
 }
 

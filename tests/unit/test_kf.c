@@ -836,6 +836,7 @@ static void test_kf_blow_up(void **state)
         make_scalar(&rig, forms[f], 1, 0, 1, 0, 1);
         rig.kf.P[0] = JL_LARGE;
         rig.mode.H[0] = JL_C(0.25);
+        rig.mode.every = 0;
         assert_int_equal(call(UPDATE, &z), JL_ENONFINITE);
         /* loglik = -z^2 / 2 R is beyond */
         make_scalar(&rig, forms[f], 1, 0, JL_REAL_MIN * 4, 0, 0);
