@@ -500,7 +500,7 @@ void jl_lcm_close(jl_lcm *lcm, long linger_us)
     free_all(lcm);
 }
 
-static struct peer *peer_at(jl_lcm *lcm, int node)
+static struct peer *peer_at(const jl_lcm *lcm, int node)
 {
     if (node < 0 || node >= lcm->nodes || node == lcm->node)
         return NULL;
@@ -521,11 +521,18 @@ jl_chan *jl_lcm_rx(jl_lcm *lcm, int node)
     return p == NULL ? NULL : &p->rx.chan;
 }
 
+const jl_link *jl_lcm_link(const jl_lcm *lcm, int node)
+{
+    const struct peer *p = peer_at(lcm, node);
+
+    return p == NULL ? NULL : &p->link;
+}
+
 long jl_lcm_silence(const jl_lcm *lcm, int node)
 {
-    if (node < 0 || node >= lcm->nodes || node == lcm->node)
-        return -1;
-    return jl_link_silence(&lcm->peers[node].link, link_time(clock_us()));
+    const jl_link *link = jl_lcm_link(lcm, node);
+
+    return link == NULL ? -1 : jl_link_silence(link, link_time(clock_us()));
 }
 
 jl_link_count jl_lcm_count(const jl_lcm *lcm)

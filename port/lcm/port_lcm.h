@@ -73,6 +73,10 @@ jl_chan *jl_lcm_rx(jl_lcm *lcm, int node);
  * fetched. */
 long jl_lcm_silence(const jl_lcm *lcm, int node);
 
+/* The link to another node, to look at what it does; valid until jl_lcm_close.
+ * Its time is that of CLOCK_MONOTONIC [us].  NULL as for a channel. */
+const jl_link *jl_lcm_link(const jl_lcm *lcm, int node);
+
 /* Sum of the counters of all links; `refused` also counts what came from no
  * node of this run. */
 jl_link_count jl_lcm_count(const jl_lcm *lcm);

@@ -74,7 +74,7 @@ static void compare(const struct par_shape *shape)
         host = par_host(&trace, shape, to[0], from[0], NULL);
     jl_lcm_close(lcm, 10000000);
     for (pe = 0; pe < shape->npe; pe++) {
-        if (host != JL_OK)
+        if (host != JL_OK && pid[pe] > 0)
             kill(pid[pe], SIGKILL);
         waitpid(pid[pe], &status, 0);
         bad += status != 0;

@@ -72,11 +72,12 @@ int crew_failures(const pid_t *child, int n)
     for (i = 0; i < n; i++) {
         if (child[i] < 0 || waitpid(child[i], &status, 0) != child[i]) {
             failed++;
+            print_error("process %d was not there\n", i);
         } else if (status != 0) {
             failed++;
             if (WIFSIGNALED(status))
-                print_error("a process was ended by signal %d\n",
-                            WTERMSIG(status));
+                print_error("process %d (%ld) was ended by signal %d\n", i,
+                            (long)child[i], WTERMSIG(status));
         }
     }
     return failed;

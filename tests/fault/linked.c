@@ -305,6 +305,11 @@ jl_chan *linked_rx(linked *l, int node)
     return &l->peers[node].rx.chan;
 }
 
+const jl_link *linked_link(const linked *l, int node)
+{
+    return &l->peers[node].link;
+}
+
 jl_link_count linked_count(const linked *l)
 {
     jl_link_count sum = { 0 };

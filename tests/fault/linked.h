@@ -38,6 +38,9 @@ void linked_close(linked *l, long linger_us);
 jl_chan *linked_tx(linked *l, int node);
 jl_chan *linked_rx(linked *l, int node);
 
+/* The link to another node, to look at. */
+const jl_link *linked_link(const linked *l, int node);
+
 /* What happened so far: sums over the links, and the faults. */
 jl_link_count linked_count(const linked *l);
 const fault *linked_fault(const linked *l);

@@ -99,9 +99,14 @@ static int run(int nodes, int max_len, int (*life)(int node, void *context),
 
 static int live_in_pair(int node, void *context)
 {
-    return pair_body(node, *(const long *)context,
-                     linked_tx(w.linked[node], 1 - node),
-                     linked_rx(w.linked[node], 1 - node));
+    linked *l = w.linked[node];
+    int failed = pair_body(node, *(const long *)context,
+                           linked_tx(l, 1 - node), linked_rx(l, 1 - node));
+
+    if (failed)
+        pair_explain(node, linked_link(l, 1 - node), linked_fault(l),
+                     now(w.carrier));
+    return failed;
 }
 
 void linked_suite_million(const linked_port *over)

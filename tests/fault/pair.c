@@ -4,6 +4,7 @@
 #include <string.h>
 
 #define PATIENCE_US 30000000L
+#define LATE_US 3000000L        /* two dozen of the longest repetitions     */
 #define AHEAD 4                 /* messages sent before the first is awaited */
 
 const fault_set pair_sets[PAIR_SETS] = {
@@ -71,10 +72,13 @@ static int receive_one(int node, long number, jl_chan *from)
 
     if (len == expected && memcmp(msg, want, (size_t)len) == 0)
         return 0;
-    if (len < 0)
+    if (len < 0) {
         fprintf(stderr, "node %d waits in vain for message %ld: %s\n", node,
                 number, jl_status_text(len));
-    else
+        if (len == JL_ETIMEOUT
+            && jl_chan_recv(from, msg, (int)sizeof msg, LATE_US) >= 0)
+            fprintf(stderr, "node %d: it came later\n", node);
+    } else
         fprintf(stderr, "node %d: %d octets came where message %ld of %d is "
                 "due\n", node, len, number, expected);
     return 1;
@@ -92,6 +96,33 @@ int pair_body(int node, long n, jl_chan *to, jl_chan *from)
             return 1;
     }
     return 0;
+}
+
+void pair_explain(int node, const jl_link *link, const fault *f, jl_u32 now)
+{
+    const jl_link_count *c = &link->count;
+
+    fprintf(stderr,
+            "node %d: session %08x, the other's %08x, up %d, failed: %s, "
+            "heard %u us ago\n"
+            "  out_first %u, next %u, high %u, end %u; sent %u us ago, wait %u, "
+            "heeded %d\n"
+            "  in_next %u, held %d, len %d, gap %d, room_lacked %d\n"
+            "  sent %lu, resent %lu, acks %lu, received %lu, doubled %lu, "
+            "early %lu, refused %lu, stale %lu\n"
+            "  faults: %lu put, %lu got, %lu crowded\n",
+            node, (unsigned)link->config.session, (unsigned)link->peer,
+            link->up, jl_status_text(link->failed),
+            (unsigned)(now - link->heard_at),
+            (unsigned)link->out_first, (unsigned)link->out_next,
+            (unsigned)link->out_high, (unsigned)link->out_end,
+            (unsigned)(now - link->sent_at), (unsigned)link->wait_us,
+            link->heeded,
+            (unsigned)link->in_next, link->in_held, link->in_len, link->in_gap,
+            link->room_lacked,
+            c->sent, c->resent, c->acks, c->received, c->doubled, c->early,
+            c->refused, c->stale,
+            f->put, f->got, f->crowded);
 }
 
 void pair_add(struct pair_result *result, const jl_link_count *count,

@@ -36,8 +36,14 @@ struct pair_result {
 
 /* Node 0's or 1's part: send n messages, receive n, each of a length and of
  * octets determined by its number.
- * Returns 0, or 1 after a line that says what came instead. */
+ * Returns 0, or 1 after lines that say what came instead; also if what did not
+ * come did so soon after: then it is not the link that failed, but the machine
+ * or a process stood still. */
 int pair_body(int node, long n, jl_chan *to, jl_chan *from);
+
+/* Why nothing came, as far as a node knows: its link (by the names of link.h)
+ * and its faults (fault.h), on stderr.  The time is the link's. */
+void pair_explain(int node, const jl_link *link, const fault *f, jl_u32 now);
 
 /* Add what one node counted. */
 void pair_add(struct pair_result *result, const jl_link_count *count,

@@ -14,11 +14,16 @@ static void live_in_pair(int pair, int which, const fault_set *set, long n)
     int other = 1 - which;
     char run[32];
     jl_lcm *lcm;
+    int failed;
 
     snprintf(run, sizeof run, "pair%d", pair);
     lcm = crew_join(run, which, 2, PAIR_MAX_LEN, 0, set, node);
-    crew_leave(lcm, node, pair_body(which, n, jl_lcm_tx(lcm, other),
-                                    jl_lcm_rx(lcm, other)));
+    failed = pair_body(which, n, jl_lcm_tx(lcm, other),
+                       jl_lcm_rx(lcm, other));
+    if (failed)
+        pair_explain(which, jl_lcm_link(lcm, other), &node->fault,
+                     (jl_u32)(unsigned long long)(1e6 * crew_clock()));
+    crew_leave(lcm, node, failed);
 }
 
 static long run(const fault_set *set, long messages)

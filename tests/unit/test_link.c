@@ -303,6 +303,26 @@ static void test_link_everything_at_once(void **state)
     }
 }
 
+/* Whatever a bad carrier did, at whatever moment it becomes good: what was sent
+ * is there, and known to be there, after the longest wait between repetitions
+ * (16 rto_us of 20 ms), two ways there and back of 1 ms, the first for one piece
+ * and the second for the rest, and the wait of an acknowledgement (2 ms). */
+static void test_link_recovers_with_the_carrier(void **state)
+{
+    static const carrier blind = { 95, 20, 5, 5, 200, 8000 };
+    unsigned seed;
+
+    (void)state;
+    for (seed = 1; seed <= 600; seed++) {
+        begin(seed % 3 == 0 ? lossy : seed % 3 == 1 ? awful : blind, seed);
+        goals(1000000, seed % 2 == 0 ? 0 : 1000000);
+        assert_false(run(NULL, 20000 + (jl_u32)dice(2000000)));
+        w.c = clean;
+        goals(w.e[0].sent, w.e[1].sent);
+        assert_true(run(all_there, 16 * 20000 + 2 * 1000 + 2000));
+    }
+}
+
 static void test_link_one_way(void **state)
 {
     (void)state;
@@ -1535,6 +1555,7 @@ int main(void)
         cmocka_unit_test(test_link_clean),
         cmocka_unit_test(test_link_loses_a_third),
         cmocka_unit_test(test_link_everything_at_once),
+        cmocka_unit_test(test_link_recovers_with_the_carrier),
         cmocka_unit_test(test_link_one_way),
         cmocka_unit_test(test_link_wraps),
         cmocka_unit_test(test_link_receives_slowly),
