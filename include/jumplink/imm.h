@@ -27,7 +27,7 @@
  * Equal in exact arithmetic; found out by jl_imm_chain.
  *
  * A step computes into a second set of estimates, and weigh, the last stage
- * that changes the filter's state (x, P, mu, logmu), makes it the valid one.
+ * that changes the filter's state (x, P, mu), makes it the valid one.
  * So on any error the state is as it was before the step; xhat, Phat and
  * loglik are results, and combine brings them up to the state at any time.
  */
@@ -80,8 +80,9 @@ typedef struct jl_imm {
     /* the state: valid between steps */
     jl_real *x;                 /* [M,n]                                    */
     jl_real *P;                 /* [M,n,n] as the form keeps it: jl_imm_cov */
-    jl_real *logmu;             /* [M]                                      */
-    jl_real *mu;                /* [M] exp(logmu)                           */
+    jl_real *mu;                /* [M]                                      */
+    jl_real *logmu;             /* [M] log mu where mu is next to nothing, or
+                                   nothing, else 0: jl_imm_logmu            */
 
     /* results of combine and weigh */
     jl_real *xhat;              /* [n]                                      */
@@ -95,8 +96,8 @@ typedef struct jl_imm {
     jl_real *xw;                /* [M,n] with a gate, of modes that reject,
                                    predicted only until judge               */
     jl_real *Pw;                /* [M,n,n]                                  */
-    jl_real *logc;              /* [M] predicted log-probabilities          */
-    jl_real *c;                 /* [M] exp(logc)                            */
+    jl_real *c;                 /* [M] predicted probabilities              */
+    jl_real *logc;              /* [M] log c, likewise                      */
     jl_real *l;                 /* [M] log-likelihoods                      */
     jl_real *nis;               /* [M] nu' S^-1 nu; 0 without z             */
     jl_real *nu;                /* [M,m] innovations                        */
@@ -159,6 +160,10 @@ int jl_imm_gate(jl_imm *imm, jl_real nis, int most);
 
 /* The covariance P [n,n] of mode j's present estimate, in any form. */
 void jl_imm_cov(const jl_imm *imm, int j, jl_real *P);
+
+/* log mu_j of the present estimate, also where mu_j is too small for a number:
+ * a mode a million times less likely each step comes back after an hour. */
+jl_real jl_imm_logmu(const jl_imm *imm, int j);
 
 /* Set the chain: Pi [M,M], rows sum to 1 (copied).  May be called between any
  * two steps, so a chain that depends on the time step is set before each.

@@ -60,6 +60,7 @@
 #define jl_imm_init_sizes jl_imm_init_sizes_f32
 #define jl_imm_gate jl_imm_gate_f32
 #define jl_imm_cov jl_imm_cov_f32
+#define jl_imm_logmu jl_imm_logmu_f32
 #define jl_imm_chain jl_imm_chain_f32
 #define jl_imm_set jl_imm_set_f32
 #define jl_imm_step jl_imm_step_f32

@@ -13,7 +13,7 @@ static void set_mu(jl_imm *imm, const jl_real *mu)
         sum += mu != NULL ? mu[j] : 1;
     for (j = 0; j < imm->M; j++) {
         imm->mu[j] = (mu != NULL ? mu[j] : 1) / sum;
-        imm->logmu[j] = jl_log(imm->mu[j]);
+        imm->logmu[j] = imm->mu[j] > JLI_SMALL ? 0 : jl_log(imm->mu[j]);
     }
 }
 
@@ -116,6 +116,12 @@ int jl_imm_init(jl_imm *imm, int M, const jl_mode *modes,
     return M < 1 ? JL_EDIM
         : jl_imm_init_sizes(imm, M, modes[0].n, modes, NULL, NULL, NULL, form,
                             mixing, mem, cap);
+}
+
+jl_real jl_imm_logmu(const jl_imm *imm, int j)
+{
+    JL_ASSERT(j >= 0 && j < imm->M);
+    return jli_log_of(imm->mu[j], imm->logmu[j]);
 }
 
 void jl_imm_cov(const jl_imm *imm, int j, jl_real *P)

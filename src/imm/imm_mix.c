@@ -14,12 +14,12 @@ static jl_real log_foresee(jl_imm *imm, int j)
     if (imm->sticky) {
         jl_real two[2];
 
-        two[0] = jl_log(imm->lambda[j]) + imm->logmu[j];
+        two[0] = jl_log(imm->lambda[j]) + jl_imm_logmu(imm, j);
         two[1] = jl_log(imm->v[j]);
         return jli_log_sum_exp(two, 2, &sum);
     }
     for (i = 0; i < M; i++)
-        e[i] = jl_log(imm->Pi[i * M + j]) + imm->logmu[i];
+        e[i] = jl_log(imm->Pi[i * M + j]) + jl_imm_logmu(imm, i);
     return jli_log_sum_exp(e, M, &sum);
 }
 
@@ -37,7 +37,7 @@ void jl_imm_foresee(jl_imm *imm)
     }
     for (j = 0; j < M; j++)
         if (imm->c[j] > JLI_SMALL) {
-            imm->logc[j] = jl_log(imm->c[j]);
+            imm->logc[j] = 0;
         } else {
             imm->logc[j] = log_foresee(imm, j);
             imm->c[j] = jl_exp(imm->logc[j]);
@@ -78,7 +78,8 @@ static void shares(jl_real *w, const jl_imm *imm, int j)
         return;
     }
     for (i = 0; i < M; i++)
-        w[i] = jl_exp(jl_log(Pi[i * M]) + imm->logmu[i] - imm->logc[j]);
+        w[i] = jl_exp(jl_log(Pi[i * M]) + jl_imm_logmu(imm, i)
+                      - imm->logc[j]);
     normalise(w, M);
 }
 
@@ -92,7 +93,7 @@ static void sticky_shares(jl_real *w, const jl_imm *imm, int j)
         w[1] = share(imm->v[j], imm->c[j], r);
         return;
     }
-    w[0] = jl_exp(jl_log(imm->lambda[j]) + imm->logmu[j] - imm->logc[j]);
+    w[0] = jl_exp(jl_log(imm->lambda[j]) + jl_imm_logmu(imm, j) - imm->logc[j]);
     w[1] = jl_exp(jl_log(imm->v[j]) - imm->logc[j]);
     normalise(w, 2);
 }

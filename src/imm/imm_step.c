@@ -142,20 +142,6 @@ static void swap(jl_real **a, jl_real **b)
     *b = t;
 }
 
-/* The largest log-likelihood of a mode that is possible.  Differences to it
- * keep the digits of log c, however large a likelihood's logarithm is: after an
- * outlier of 1e5 sigma that is 1e10. */
-static jl_real best_likelihood(const jl_imm *imm)
-{
-    jl_real best = -JL_REAL_MAX;
-    int j;
-
-    for (j = 0; j < imm->M; j++)
-        if (imm->logc[j] >= -JL_REAL_MAX && imm->l[j] > best)
-            best = imm->l[j];
-    return best;
-}
-
 /* As in kf.c, counts stay where they are as large as can be. */
 static void count(jl_imm *imm)
 {
@@ -177,19 +163,15 @@ static void count(jl_imm *imm)
 int jl_imm_weigh(jl_imm *imm)
 {
     int j, M = imm->M;
-    jl_real *e = imm->e, best, sum, lse;
+    jl_real best, sum, lse;
 
     if (imm->stage != JLI_JUDGED)
         return JL_EORDER;
-    best = best_likelihood(imm);
+    lse = jli_weights(imm, NULL, 0, &best, &sum);
     for (j = 0; j < M; j++) {
-        imm->logmu[j] = imm->logc[j] + (imm->l[j] - best);
-        e[j] = imm->logmu[j];
-    }
-    lse = jli_log_sum_exp(e, M, &sum);
-    for (j = 0; j < M; j++) {
-        imm->logmu[j] -= lse;
-        imm->mu[j] = e[j] / sum;
+        imm->mu[j] = imm->e[j] / sum;
+        imm->logmu[j] = imm->mu[j] > JLI_SMALL ? 0
+            : jli_log_weight(imm, j, best) - lse;
     }
     imm->loglik = imm->verdict == JL_ACCEPTED ? best + lse : 0;
     count(imm);

@@ -36,16 +36,9 @@ void jli_pool_own(jl_par *par)
 {
     jl_imm *imm = par->imm;
     int j, n = imm->n;
-    jl_real *x = par->pool, *P = x + n, best = -JL_REAL_MAX, sum = 0, unused;
+    jl_real *x = par->pool, *P = x + n, sum = 0, best, all;
 
-    for (j = 0; j < imm->M; j++)        /* of those that are possible */
-        if (is_own(par, j) && imm->logc[j] >= -JL_REAL_MAX
-            && imm->l[j] > best)
-            best = imm->l[j];
-    for (j = 0; j < imm->M; j++)        /* log 0 of the others */
-        imm->e[j] = is_own(par, j) ? imm->logc[j] + (imm->l[j] - best)
-            : jl_log(0);
-    (void)jli_log_sum_exp(imm->e, imm->M, &unused);
+    (void)jli_weights(imm, par->config.owner, par->config.pe, &best, &all);
     memset(x, 0, (size_t)(n + n * n) * sizeof *x);
     for (j = 0; j < imm->M; j++)
         if (is_own(par, j))

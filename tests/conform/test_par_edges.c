@@ -79,12 +79,13 @@ static void test_pool_heeds_only_modes_that_are_possible(void **state)
     imm.Pw = mem + MODES;
     imm.l = mem + 2 * MODES;
     imm.e = mem + 3 * MODES;
-    imm.logc = mem + 4 * MODES;
+    imm.c = mem + 4 * MODES;
+    imm.logc = mem + 5 * MODES;
     imm.l[0] = imm.l[1] = -1 / JL_EPSILON / JL_EPSILON;
     imm.l[2] = 0;
-    imm.logc[0] = jl_log(JL_C(0.25));
-    imm.logc[1] = jl_log(JL_C(0.75));
-    imm.logc[2] = jl_log(0);
+    imm.c[0] = JL_C(0.25);
+    imm.c[1] = JL_C(0.75);
+    imm.logc[2] = jl_log(0);            /* and c[2] = 0 */
     imm.xw[1] = 1;
     imm.xw[2] = 1000;
     imm.Pw[0] = imm.Pw[1] = imm.Pw[2] = 2;
