@@ -79,65 +79,61 @@ static void miss(jl_kf *kf, jl_real *loglik)
         *loglik = 0;
 }
 
-/* With one, of which the form told `got`.  Counts stay where they are as large
- * as can be: a mean divides by one, and one that is signed must not overflow. */
-static void count(jl_kf *kf, jl_real *loglik, const jl_innovation *got)
+/* The form's update or step.  Counts stay where they are as large as can be: a
+ * mean divides by one, and one that is signed must not overflow. */
+static int measure(jl_kf *kf, jl_real *loglik, const jl_real *z,
+                   jl_real *scratch,
+                   int (*take)(jl_real *x, jl_real *P,
+                               jl_innovation *innovation, const jl_mode *mode,
+                               const jl_real *z, jl_real gate,
+                               jl_real *scratch))
 {
-    jl_real *nu = kf->innovation.nu;
-    int rejected = kf->gate > 0 && got->nis > limit(kf), a;
+    int m = kf->mode->m, status, a;
+    jl_real gate = limit(kf), *nu = kf->innovation.nu;
+    jl_innovation got;
 
-    for (a = 0; a < kf->mode->m; a++)
-        nu[a] = got->nu[a];
-    kf->innovation = *got;
-    kf->innovation.nu = nu;
-    if (rejected) {
+    got.nu = scratch;
+    status = take(kf->x, kf->P, &got, kf->mode, z, gate, scratch + m);
+    if (status != JL_OK)
+        return status;
+    for (a = 0; a < m; a++)
+        nu[a] = scratch[a];
+    kf->innovation.nis = got.nis;
+    kf->innovation.loglik = got.loglik;
+    if (gate > 0 && got.nis > gate) {
         kf->verdict = JL_REJECTED;
         kf->run += kf->run < INT_MAX;
         kf->rejected++;
+        got.loglik = 0;
     } else {
         kf->verdict = JL_ACCEPTED;
         kf->run = 0;
         kf->accepted += kf->accepted < ULONG_MAX;
-        kf->nis_mean += (got->nis - kf->nis_mean) / (jl_real)kf->accepted;
+        kf->nis_mean += (got.nis - kf->nis_mean) / (jl_real)kf->accepted;
     }
     if (loglik != NULL)
-        *loglik = rejected ? 0 : got->loglik;
+        *loglik = got.loglik;
+    return JL_OK;
 }
 
 int jl_kf_update(jl_kf *kf, jl_real *loglik, const jl_real *z,
                  jl_real *scratch)
 {
-    jl_innovation got;
-    int status;
-
-    if (z == NULL) {
-        miss(kf, loglik);
-        return JL_OK;
-    }
-    got.nu = scratch;
-    status = kf->form->update(kf->x, kf->P, &got, kf->mode, z, limit(kf),
-                              scratch + kf->mode->m);
-    if (status == JL_OK)
-        count(kf, loglik, &got);
-    return status;
+    if (z != NULL)
+        return measure(kf, loglik, z, scratch, kf->form->update);
+    miss(kf, loglik);
+    return JL_OK;
 }
 
 int jl_kf_step(jl_kf *kf, jl_real *loglik, const jl_real *z,
                jl_real *scratch)
 {
-    jl_innovation got;
     int status;
 
-    if (z == NULL) {
-        status = jl_kf_predict(kf, scratch);
-        if (status == JL_OK)
-            miss(kf, loglik);
-        return status;
-    }
-    got.nu = scratch;
-    status = kf->form->step(kf->x, kf->P, &got, kf->mode, z, limit(kf),
-                            scratch + kf->mode->m);
+    if (z != NULL)
+        return measure(kf, loglik, z, scratch, kf->form->step);
+    status = jl_kf_predict(kf, scratch);
     if (status == JL_OK)
-        count(kf, loglik, &got);
+        miss(kf, loglik);
     return status;
 }
