@@ -23,6 +23,7 @@ static const struct {
 } who[] = {
     { "Eigen, fixed size", sizes_eigen },
     { "jumplink, fixed size", sizes_fixed },
+    { "... zeros not known", sizes_dense },
     { "jumplink, any size", sizes_any },
     { "plain C, any size", sizes_plain }
 };

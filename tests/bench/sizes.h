@@ -40,7 +40,9 @@ struct sizes_filter {
 typedef struct sizes_filter *sizes_make(const struct sizes_model *model,
                                         enum sizes_form form);
 
-sizes_make sizes_fixed, sizes_any, sizes_plain, sizes_eigen;
+/* sizes_dense: as sizes_fixed, of modes that do not know where F and H are zero,
+ * as Eigen and plain C do not. */
+sizes_make sizes_fixed, sizes_dense, sizes_any, sizes_plain, sizes_eigen;
 
 #ifdef __cplusplus
 }

@@ -141,3 +141,18 @@ struct sizes_filter *sizes_fixed(const struct sizes_model *model,
 
     return fixed->n == 0 ? NULL : new_filter(model, fixed);
 }
+
+struct sizes_filter *sizes_dense(const struct sizes_model *model,
+                                 enum sizes_form form)
+{
+    struct sizes_filter *filter = form == SQRT ? NULL
+        : sizes_fixed(model, form);
+    jl_mode *modes = filter == NULL ? NULL : of(filter)->modes;
+    int j;
+
+    for (j = 0; modes != NULL && j < model->M; j++) {
+        modes[j].block = model->n;
+        modes[j].every = 0;
+    }
+    return filter;
+}
