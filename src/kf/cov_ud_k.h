@@ -31,18 +31,24 @@ JL_INLINE void jli_ud_scale(jl_real *S, const jl_real *S1, jl_real w, int n)
         S[k * (n + 1)] *= w;
 }
 
-/* S = S + w S1, row by row; v [n]                                   n^3 / 2 */
-JL_INLINE void jli_ud_add(jl_real *S, jl_real w, const jl_real *S1,
-                          jl_real *v, int n)
+/* S = S + wd d' d + w S1; d [n] is 0 then, whatever way it went, for it is part
+ * of what an IMM keeps.                                             n^3 / 2 */
+JL_INLINE void jli_ud_add(jl_real *S, jl_real *d, jl_real wd,
+                          const jl_real *S1, jl_real w, int n)
 {
-    int k, j;
+    int k;
 
-    for (k = 0; k < n; k++) {
-        v[k] = 1;
-        for (j = k + 1; j < n; j++)
-            v[j] = S1[k * n + j];
-        jli_ud_absorb(S, v, w * S1[k * n + k], k, n);
+    if (JLI_KNOWN(n) && n <= JLI_AT_ONCE) {
+        jli_ud_absorb_all(S, d, wd, S1, w, n);
+    } else {
+        jli_ud_absorb(S, d, wd, 0, n);
+        for (k = 0; k < n && w > 0; k++) {
+            jli_copy(d, S1 + k * n, n);
+            d[k] = 1;
+            jli_ud_absorb(S, d, w * S1[k * (n + 1)], k, n);
+        }
     }
+    memset(d, 0, (size_t)n * sizeof *d);
 }
 
 JL_INLINE int jli_heaviest(const jl_real *w, int M)
@@ -57,19 +63,19 @@ JL_INLINE int jli_heaviest(const jl_real *w, int M)
 
 /* The heaviest comes first and costs nothing. */
 JL_INLINE void jli_ud_pool(jl_real *mean, jl_real *S, const jl_real *w,
-                           const jl_real *x, const jl_real *Ss, jl_real *v,
+                           const jl_real *x, const jl_real *Ss, jl_real *d,
                            int M, int n)
 {
-    int first = jli_heaviest(w, M), i, a;
+    int first = jli_heaviest(w, M), i, j;
 
     jli_mean(mean, w, x, M, n);
     jli_ud_scale(S, Ss + first * n * n, w[first], n);
     for (i = 0; i < M; i++) {
-        if (i != first)
-            jli_ud_add(S, w[i], Ss + i * n * n, v, n);
-        for (a = 0; a < n; a++)
-            v[a] = x[i * n + a] - mean[a];
-        jli_ud_absorb(S, v, w[i], 0, n);
+        const jl_real *xi = x + i * n;
+
+        j = 0;
+        JLI_BY_LANES(JLI_DIFF, n)
+        jli_ud_add(S, d, w[i], Ss + i * n * n, i == first ? 0 : w[i], n);
     }
 }
 
@@ -80,8 +86,7 @@ JL_INLINE void jli_ud_blend(jl_real *x, jl_real *S, jl_real a,
 {
     jli_between(x, d, a, x1, b, x2, n);
     jli_ud_scale(S, S1, a, n);
-    jli_ud_add(S, b, S2, d + n, n);
-    jli_ud_absorb(S, d, a * b, 0, n);
+    jli_ud_add(S, d, a * b, S2, b, n);
 }
 
 #endif

@@ -6,11 +6,22 @@
 #include "kf/kf_k.h"
 #include "mat/ud_k.h"
 
-/* 1 if x and the variances that S stands for are within bounds. */
+/* 1 if x and the variances that S stands for are within bounds; they are if the
+ * sum of all is, as nearly always (NaN is not). */
 JL_INLINE int jli_factor_ok(const jl_real *x, const jl_real *S, int n)
 {
+    jl_real sum = 0;
     int j, k;
 
+    for (k = 0; k < n; k++) {
+        jl_real squares = 1;
+
+        for (j = k + 1; j < n; j++)
+            squares += S[k * n + j] * S[k * n + j];
+        sum += S[k * (n + 1)] * squares + x[k] * x[k];
+    }
+    if (sum <= JL_LARGE * JL_LARGE / 2)
+        return 1;
     for (j = 0; j < n; j++) {
         jl_real variance = S[j * (n + 1)];
 
@@ -90,7 +101,7 @@ JL_INLINE int jli_sqrt_update(jl_real *x, jl_real *S,
 {
     struct jli_sensor sensor;
     jl_real *H = scratch, *y = H + m * n, *K = y + m;
-    jl_real twice = (jl_real)m * JLI_LOG_2PI;
+    jl_real *alphas = K + n;
     int i, a, status;
 
     status = jli_kf_sense(innovation->nu, &sensor, mode, xp, z, K + n, n, m,
@@ -116,11 +127,10 @@ JL_INLINE int jli_sqrt_update(jl_real *x, jl_real *S,
         for (i = 0; i < n; i++)
             x[i] += K[i] * (nu / alpha);
         innovation->nis += nu * nu / alpha;
-        twice += jl_log(alpha);
+        alphas[a] = alpha;
     }
-    twice += innovation->nis;
-    innovation->loglik = -twice / 2;
-    return jli_finite(twice) && jli_factor_ok(x, S, n) ? JL_OK : JL_ENONFINITE;
+    status = jli_kf_likelihood(innovation, alphas, m);
+    return jli_factor_ok(x, S, n) ? status : JL_ENONFINITE;
 }
 
 #endif
