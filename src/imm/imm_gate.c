@@ -11,11 +11,6 @@ int jl_imm_gate(jl_imm *imm, jl_real nis, int most)
     return JL_OK;
 }
 
-int jli_is_possible(const jl_imm *imm, int j)
-{
-    return imm->logc[j] >= -JL_REAL_MAX;
-}
-
 static int rejects(const jl_imm *imm, int j)
 {
     return imm->gate > 0 && imm->nis[j] > imm->gate;

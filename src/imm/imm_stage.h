@@ -27,7 +27,6 @@ JL_INLINE jl_real jli_log_of(jl_real p, jl_real log_p)
 #define jli_weights jli_weights_f32
 #define jli_log_weight jli_log_weight_f32
 #define jli_imm_update jli_imm_update_f32
-#define jli_is_possible jli_is_possible_f32
 #define jli_check_sizes jli_check_sizes_f32
 #define jli_own_states jli_own_states_f32
 #define jli_all_states jli_all_states_f32
@@ -50,7 +49,10 @@ jl_real jli_weights(jl_imm *imm, const unsigned char *owner, int pe,
 jl_real jli_log_weight(const jl_imm *imm, int j, jl_real best);
 
 /* 1 if mode j can be entered. */
-int jli_is_possible(const jl_imm *imm, int j);
+JL_INLINE int jli_is_possible(const jl_imm *imm, int j)
+{
+    return imm->logc[j] >= -JL_REAL_MAX;
+}
 
 /* Update mode j in xw, Pw.  With a gate, a mode outside it stays as it is, until
  * all know that the measurement is accepted; so does one that is impossible, and
