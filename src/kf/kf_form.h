@@ -129,4 +129,27 @@ JL_INLINE int jli_form_step(jli_predict_kernel *predict,
                              gate, scratch, n, m, b, e); \
     }
 
+/* The same with the kernels called, not written out in each: for any size, and
+ * where there are no lanes and code is dearer than time. */
+#define JLI_FORM_CALLS(name, predict, update, n, m, b, e) \
+    static int name##_foresee(jl_real *xp, jl_real *Pp, const jl_mode *mode, \
+                              const jl_real *x, const jl_real *P, \
+                              jl_real *scratch, int states, int block) \
+    { \
+        (void)states, (void)block; \
+        return predict(xp, Pp, mode, x, P, scratch, n, b); \
+    } \
+    \
+    static int name##_absorb(jl_real *x, jl_real *P, \
+                             jl_innovation *innovation, const jl_mode *mode, \
+                             const jl_real *xp, const jl_real *Pp, \
+                             const jl_real *z, jl_real *scratch, int states, \
+                             int measured, int every) \
+    { \
+        (void)states, (void)measured, (void)every; \
+        return update(x, P, innovation, mode, xp, Pp, z, scratch, n, m, e); \
+    } \
+    \
+    JLI_FORM_FUNCTIONS(name, name##_foresee, name##_absorb, n, m, b, e)
+
 #endif

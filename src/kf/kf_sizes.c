@@ -24,8 +24,14 @@
         kernel(x, S, a, x1, S1, b, x2, S2, scratch, N); \
     }
 
+#ifdef JLI_WIDEST
+#define FUNCTIONS JLI_FORM_FUNCTIONS
+#else
+#define FUNCTIONS JLI_FORM_CALLS
+#endif
+
 #define FORM(form, predict, update, cov, N, M) \
-    JLI_FORM_FUNCTIONS(form##_##N##_##M, predict, update, N, M, N / M, N / M) \
+    FUNCTIONS(form##_##N##_##M, predict, update, N, M, N / M, N / M) \
     const jl_kf_form JL_KF_FIXED(form, N, M) = { \
         form##_##N##_##M##_predict, form##_##N##_##M##_update, \
         form##_##N##_##M##_step, &cov##_##N##_##M, N, M \
