@@ -218,11 +218,50 @@ static void test_structure_imm_has_equal_numbers(void **state)
         }
 }
 
+/* Zeros that products of negative numbers leave in a model do not tell how many
+ * a sum left out: a form for any size leaves out those outside blocks of 1, one
+ * of fixed size those outside the blocks of motions. */
+static void test_structure_zeros_have_one_sign(void **state)
+{
+    static const jl_real F[16] = { -1, 0, 0, 0, 0, -1, 0, 0,
+                                   0, 0, -1, 0, 0, 0, 0, -1 };
+    static const jl_real G[4] = { 0, -1, 0, 0 }, Q = 1, w_bar = 0;
+    static const jl_real H[8] = { 1, 0, 0, 0, 0, 0, 1, 0 };
+    static const jl_real R[4] = { 1, 0, 0, 1 }, x[4], z[2];
+    jl_real mem[2][JL_KF_STATE(4, 2)], P[16];
+    jl_kf kf[2];
+    int f, i, k;
+
+    (void)state;
+    for (i = 0; i < 16; i++)
+        P[i] = (jl_real)(i % 5 == 0);
+    jl_mode_init(&modes[0], 4, 2, 1, mode_mem[0], JL_MODE_MEM(4, 2, 1));
+    assert_int_equal(jl_mode_set(&modes[0], F, G, &Q, &w_bar, H, R, scratch),
+                     JL_OK);
+    for (f = 0; f < FORMS; f++) {
+        for (i = 0; i < 2; i++) {
+            jl_kf_init(&kf[i], &modes[0], i == 0 ? forms[f]
+                       : jl_kf_fixed(forms[f], 4, 2), mem[i],
+                       JL_KF_STATE(4, 2));
+            jl_kf_set(&kf[i], x, P, scratch);
+        }
+        for (k = 0; k < 10; k++)
+            for (i = 0; i < 2; i++) {
+                assert_int_equal(k % 2 == 0 ? jl_kf_predict(&kf[i], scratch)
+                                 : jl_kf_update(&kf[i], NULL, z, scratch),
+                                 JL_OK);
+                if (i == 1)
+                    assert_same_bits(mem[0], mem[1], sizeof mem[0]);
+            }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_structure_kf_has_equal_numbers),
         cmocka_unit_test(test_structure_imm_has_equal_numbers),
+        cmocka_unit_test(test_structure_zeros_have_one_sign),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
