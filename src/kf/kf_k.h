@@ -164,8 +164,8 @@ JL_INLINE int jli_normal(jl_real x)
     return x >= JL_REAL_MIN && x <= JL_REAL_MAX;
 }
 
-/* sum log d_a of normal d_a: one logarithm, of the product, unless that leaves the range in
- * which numbers have all digits. */
+/* sum log d_a of normal d_a: one logarithm, of the product, unless that leaves
+ * the range in which numbers have all digits. */
 JL_INLINE jl_real jli_log_product(const jl_real *d, int m)
 {
     jl_real product = d[0], sum = 0;

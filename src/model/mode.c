@@ -81,8 +81,8 @@ static void put(jl_real *to, const jl_real *from, int n)
         memset(to, 0, (size_t)n * sizeof *to);
 }
 
-/* -0 becomes 0.  What a prediction adds last, or first, is never -0 then, and no
- * sum is: it has the same bits whether or not it leaves out zeros. */
+/* -0 becomes 0: a sum with u or W in it is never -0 then, and has the same bits
+ * whether or not it leaves out zeros. */
 static void unsign_zeros(jl_real *v, int n)
 {
     int i;
