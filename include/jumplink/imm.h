@@ -13,9 +13,9 @@
  *     combine   xhat = sum_j mu_j x_j
  *               Phat = sum_j mu_j (P_j + (x_j - xhat)(x_j - xhat)')
  *
- * Probabilities are kept as logarithms: a measurement 1000 sigma away from
- * every mode, or a mode that was improbable for an hour, does no harm.  A mode
- * that cannot be entered (c_j = 0) keeps its own estimate unmixed.
+ * Probabilities next to nothing are kept as logarithms: a measurement 1000 sigma
+ * away from every mode, or a mode that was improbable for an hour, does no harm.
+ * A mode that cannot be entered (c_j = 0) keeps its own estimate unmixed.
  *
  * Mixing costs O(M^2 n^2), with factors O(M^2 n^3).  If Pi = diag(lambda)
  * + 1 v' with lambda >= 0 (stay with probability p, else anywhere alike; any

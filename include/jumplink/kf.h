@@ -35,11 +35,10 @@
  *     joseph    3/2 n^3                     3/2 n^3 + 5/2 n^2 m
  *     standard  3/2 n^3                     3/2 n^2 m
  *     sqrt      3/2 n^3 + 3/2 n^2 p         3/2 n^2 m
- * of motions, whose F couples the states of b an axis, and whose H picks
- * positions (model.h), 3/2 n^2 b for the first term of predict in joseph and
- * standard, 1/2 n^3 in sqrt, and n^2 m less in their updates.  For each estimate
- * mixed into another n^2, sqrt n^3 / 2 + 3/2 n^2.  A form is a const table of
- * functions: a program that names one does not link the other.
+ * (sqrt with F of a motion: 1/2 n^3 + 3/2 n^2 p; the others with the zeros that
+ * model.h calls block and every: predict 3/2 n^2 block, update n^2 m less), and
+ * for each estimate mixed into another n^2, sqrt n^3 / 2 + 3/2 n^2.  A form is a
+ * const table of functions: a program that names one does not link the other.
  */
 #ifndef JL_KF_H
 #define JL_KF_H
@@ -67,8 +66,9 @@ extern "C" {
  *             for what the map leaves out
  * These cannot fail. */
 typedef struct jl_cov {
-    int factored;               /* 0: S is P.  1: a factor, U' D U of jl_mat_ud
-                                   with zeros below the diagonal            */
+    int factored;               /* 0: S is P, symmetric to the bit.  1: a factor,
+                                   U' D U of jl_mat_ud with zeros below the
+                                   diagonal                                 */
     void (*take)(jl_real *S, const jl_real *P, jl_real *scratch, int n);
     void (*give)(jl_real *P, const jl_real *S, int n);
     void (*pool)(jl_real *mean, jl_real *S, const jl_real *w, const jl_real *x,
@@ -95,8 +95,8 @@ typedef struct jl_innovation {
 /* A step's pieces, on arrays: x [n], P [n,n] as `cov` keeps it, in place and
  * unchanged on error; scratch [JL_FORM_SCRATCH(n, m)], which overlaps nothing.
  *     predict
- *     update    with z [m]; *innovation is set, also on error.  A nis above the
- *               gate leaves x, P as they are; gate 0: none
+ *     update    with z [m]; *innovation is set, on error undefined.  A nis above
+ *               the gate leaves x, P as they are; gate 0: none
  *     step      predict, and update: the same bits in less time
  * They return JL_OK, JL_ENONFINITE, update and step also JL_ESINGULAR, or the
  * code of a nonlinear mode's function.  With a gate, a finite z that is too

@@ -47,7 +47,7 @@ jl_real jli_weights(jl_imm *imm, const unsigned char *owner, int pe,
             : jl_exp(jli_log_weight(imm, j, *best));
         *sum += e[j];
     }
-    if (*sum > JLI_SMALL)
+    if (*sum > JL_EPSILON * JL_EPSILON)
         return jl_log(*sum);
     for (j = 0; j < M; j++)
         e[j] = owner != NULL && owner[j] != pe ? jl_log(0)

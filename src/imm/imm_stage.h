@@ -38,9 +38,10 @@ jl_real jli_log_sum_exp(jl_real *v, int n, jl_real *sum);
 
 /* Of the modes that are a PE's (owner NULL: of all), 0 for the others:
  *     e_j = c_j exp(l_j - *best),  *sum = sum e_j
- * or, if that is too small, as many times more as makes the largest e_j 1.
- * Returns the log of the former sum.  *best is the largest l_j of those that are
- * possible: differences to it keep the digits of c, however large a
+ * or, if that is below eps^2, as many times more as makes the largest e_j 1:
+ * so e_j has all digits where e_j / *sum is above JLI_SMALL, and no logarithm
+ * is kept.  Returns the log of the former sum.  *best is the largest l_j of
+ * those that are possible: differences to it keep the digits of c, however large a
  * likelihood's logarithm is; after an outlier of 1e5 sigma that is 1e10. */
 jl_real jli_weights(jl_imm *imm, const unsigned char *owner, int pe,
                     jl_real *best, jl_real *sum);

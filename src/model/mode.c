@@ -81,6 +81,16 @@ static void put(jl_real *to, const jl_real *from, int n)
         memset(to, 0, (size_t)n * sizeof *to);
 }
 
+/* -0 becomes 0: a sum with u or W in it is never -0 then, and has the same bits
+ * whether or not it leaves out zeros. */
+static void unsign_zeros(jl_real *v, int n)
+{
+    int i;
+
+    for (i = 0; i < n; i++)
+        v[i] += 0;
+}
+
 int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
                 const jl_real *Q, const jl_real *w_bar, const jl_real *H,
                 const jl_real *R, jl_real *scratch)
@@ -110,9 +120,11 @@ int jl_mode_set(jl_mode *mode, const jl_real *F, const jl_real *G,
             return JL_ENONFINITE;
     }
     put(mode->u, w_bar != NULL ? GQ : NULL, n);
+    unsign_zeros(mode->u, n);
     put(mode->F, F, n * n);
     put(mode->H, H, m * n);
     jli_copy(mode->W, W, n * n);
+    unsign_zeros(mode->W, n * n);
     jl_mat_pack(work, R, m);            /* exactly symmetric from here on */
     jl_mat_unpack(mode->R, work, m);
     jli_copy(mode->V, V, m * m);

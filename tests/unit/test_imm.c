@@ -1229,6 +1229,88 @@ static void test_imm_improbable_modes_keep_their_estimate(void **state)
     }
 }
 
+/* Two modes under a chain that never jumps, which say 2 and -2, and a third that
+ * says anything, but is impossible.  S is about 1: z moves log mu_0 / mu_1 by
+ * about 4 z. */
+static void make_rivals(void)
+{
+    int i, j;
+
+    make(3, 1, 1);
+    for (j = 0; j < 3; j++) {
+        in.F[j][0] = JL_C(0.5);
+        in.G[j][0] = JL_C(0.25);
+        in.w_bar[j] = j == 2 ? 0 : j == 0 ? 4 : -4;
+        in.H[j][0] = 1;
+        in.R[j][0] = j == 2 ? 100 : 1;
+        in.mu[j] = j == 2 ? 0 : JL_C(0.5);
+        for (i = 0; i < 3; i++)
+            in.Pi[i * 3 + j] = (jl_real)(i == j);
+    }
+}
+
+/* The probability of a mode falls by 1e-30 (float: 1e-6) a step until it is no
+ * number, and comes back: its logarithm goes from one of a number to one that is
+ * kept, and back, and no digit is lost. */
+static void test_imm_probability_leaves_the_numbers_and_returns(void **state)
+{
+    const double least = log((double)JL_REAL_MIN);
+    const jl_real push = JL_REAL_FLOAT ? JL_C(4.4) : 25;
+    int run, k;
+
+    (void)state;
+    for (run = 0; run < 2 * FORMS; run++) {
+        wide lowest = 0;
+
+        make_rivals();
+        bind(&rig, forms[run / 2], run % 2);
+        book_start();
+        for (k = 0; k < 60; k++) {
+            jl_real z = (k < 20 ? push : -push) + rnd() / 8, mu;
+
+            assert_int_equal(step(&rig, &z), JL_OK);
+            book_step(&z);
+            check_book(&rig.imm, 1000 * EPS, 60 * 1000 * EPS);
+            mu = rig.imm.mu[1];
+            if (mu > JL_REAL_MIN / JL_EPSILON / JL_EPSILON)
+                assert_close(mu / expl(book.logmu[1]), 1, 60 * 1000 * EPS);
+            lowest = fminl(lowest, book.logmu[1]);
+        }
+        assert_true(lowest < 1.5 * least);
+        assert_true(rig.imm.mu[1] > JL_C(0.99));
+    }
+}
+
+/* Evidence that goes up and down by as much as the range of numbers in a step:
+ * what is likely then had next to no probability, and sums of what it had and
+ * likelihoods are anything between 1 and nothing.  Estimates are as without. */
+static void test_imm_sums_of_next_to_nothing(void **state)
+{
+    const wide least = logl((wide)JL_REAL_MIN);
+    int run, k;
+
+    (void)state;
+    for (run = 0; run < 2 * FORMS; run++) {
+        int turns = 0, below = 0;
+
+        make_rivals();
+        bind(&rig, forms[run / 2], run % 2);
+        book_start();
+        for (k = 0; k < 100; k++) {
+            wide odds = book.logmu[0] - book.logmu[1];
+            wide size = -least * (2 + rnd()) / 6;
+            jl_real z = (jl_real)(odds > 0 ? -size : size);
+
+            assert_int_equal(step(&rig, &z), JL_OK);
+            book_step(&z);
+            check_book(&rig.imm, 1.0e6 * EPS, 1.0e6 * EPS);
+            turns += odds * (book.logmu[0] - book.logmu[1]) < 0;
+            below += fminl(book.logmu[0], book.logmu[1]) < least;
+        }
+        assert_true(turns > 50 && below > 5 && below < 95);
+    }
+}
+
 /* What all modes agree in, neither combining nor mixing moves. */
 static void check_agreed(const jl_kf_form *form, int mixing)
 {
@@ -1648,6 +1730,9 @@ int main(void)
         cmocka_unit_test(test_imm_evidence),
         cmocka_unit_test(test_imm_underflow_under_jumps),
         cmocka_unit_test(test_imm_underflowed_modes_mix),
+        cmocka_unit_test(
+            test_imm_probability_leaves_the_numbers_and_returns),
+        cmocka_unit_test(test_imm_sums_of_next_to_nothing),
         cmocka_unit_test(test_imm_improbable_modes_keep_their_estimate),
         cmocka_unit_test(test_imm_mu_within_tolerance),
         cmocka_unit_test(test_imm_mode_that_is_hardly_entered),

@@ -722,6 +722,189 @@ static void test_motion_refuses_numbers(void **state)
     assert_int_equal(number_status(3, -1), JL_ETIME);
 }
 
+/* --- what products may leave out ----------------------------------------- */
+
+static void check_structure(const jl_mode *mode, int block, int every)
+{
+    assert_int_equal(mode->block, block);
+    assert_int_equal(mode->every, every);
+}
+
+static void check_motion_structure(int kind, int axes, int order,
+                                   jl_real rate, jl_real dt, int block)
+{
+    jl_motion motion = motion_of(kind, axes, order, rate);
+
+    motion.tau_s = 20;
+    make(&rig, axes * order, axes, jl_motion_noises(&motion));
+    assert_int_equal(jl_mode_motion(&rig.mode, &motion, dt), JL_OK);
+    check_structure(&rig.mode, block, order);
+}
+
+static void test_motion_structure(void **state)
+{
+    int axes;
+
+    (void)state;
+    for (axes = 1; axes <= 3; axes++) {
+        check_motion_structure(JL_MOTION_CV, axes, 2, 0, 1, 2);
+        check_motion_structure(JL_MOTION_CV, axes, 3, 0, 1, 3);
+        check_motion_structure(JL_MOTION_CA, axes, 3, 0, 1, 3);
+        check_motion_structure(JL_MOTION_SINGER, axes, 3, 0, 1, 3);
+        check_motion_structure(JL_MOTION_CV, axes, 2, 0, 0, 1);     /* F = I */
+        check_motion_structure(JL_MOTION_CA, axes, 3, 0, 0, 1);
+    }
+    check_motion_structure(JL_MOTION_CT, 2, 2, JL_C(0.3), 1, 4);
+    check_motion_structure(JL_MOTION_CT, 2, 3, JL_C(0.3), 1, 6);
+    check_motion_structure(JL_MOTION_CT, 2, 2, 0, 1, 2);
+    check_motion_structure(JL_MOTION_CT, 2, 3, 0, 1, 3);
+}
+
+/* An F [n,n] that couples states i and k, one of the other, beside each with
+ * itself. */
+static void check_block(int n, int i, int k, int block)
+{
+    int a;
+
+    make(&rig, n, 1, 1);
+    make_input(1, 1);
+    for (a = 0; a < n * n; a++)
+        in.F[a] = a % (n + 1) == 0 ? 1 : a % 2 ? 0 : -JL_C(0.0);
+    in.F[i * n + k] = JL_REAL_MIN;
+    assert_int_equal(set(0), JL_OK);
+    assert_int_equal(rig.mode.block, block);
+}
+
+static void test_mode_set_finds_blocks(void **state)
+{
+    int i, k;
+
+    (void)state;
+    check_block(1, 0, 0, 1);
+    check_block(5, 3, 3, 1);
+    check_block(5, 0, 1, 5);            /* 2 does not divide 5 */
+    check_block(6, 0, 1, 2);
+    check_block(6, 5, 4, 2);
+    check_block(6, 1, 2, 3);
+    check_block(6, 3, 5, 3);
+    check_block(6, 3, 2, 2);
+    check_block(6, 1, 3, 6);
+    check_block(6, 5, 0, 6);
+    check_block(8, 3, 0, 4);
+    check_block(8, 3, 4, 8);
+    check_block(MAX, MAX - 1, MAX - 2, 2);
+    make(&rig, 6, 2, 2);
+    make_input(2, 2);                   /* dense */
+    assert_int_equal(set(0), JL_OK);
+    check_structure(&rig.mode, 6, 0);
+    for (i = 0; i < 6; i++)             /* blocks of 4 and 2 */
+        for (k = 0; k < 6; k++)
+            if (i / 4 != k / 4)
+                in.F[i * 6 + k] = 0;
+    assert_int_equal(set(0), JL_OK);
+    assert_int_equal(rig.mode.block, 6);
+    memset(in.F, 0, sizeof in.F);
+    assert_int_equal(set(0), JL_OK);
+    assert_int_equal(rig.mode.block, 1);
+}
+
+/* H [m,n] has only ones, in row a at state at[a]; -1: nowhere. */
+static void make_picks(int n, int m, const int *at)
+{
+    int a;
+
+    make(&rig, n, m, 1);
+    make_input(m, 1);
+    memset(in.H, 0, sizeof in.H);
+    for (a = 0; a < m; a++)
+        if (at[a] >= 0)
+            in.H[a * n + at[a]] = 1;
+}
+
+static void check_picks(int n, int m, int a, int b, int c, int every)
+{
+    int at[3];
+
+    at[0] = a;
+    at[1] = b;
+    at[2] = c;
+    make_picks(n, m, at);
+    assert_int_equal(set(0), JL_OK);
+    assert_int_equal(rig.mode.every, every);
+}
+
+static void test_mode_set_finds_what_is_picked(void **state)
+{
+    static const int at[3] = { 0, 2, 4 };
+    const jl_real not_one[] = { JL_C(0.5), -1, 1 + JL_EPSILON, 2 };
+    int i;
+
+    (void)state;
+    check_picks(4, 2, 0, 2, 0, 2);      /* x vx y vy */
+    check_picks(4, 2, 0, 1, 0, 1);      /* x y vx vy */
+    check_picks(4, 2, 0, 3, 0, 3);
+    check_picks(9, 3, 0, 3, 6, 3);
+    check_picks(6, 3, 0, 1, 2, 1);
+    check_picks(3, 3, 0, 1, 2, 1);      /* all */
+    check_picks(1, 1, 0, 0, 0, 1);
+    check_picks(4, 1, 0, 0, 0, 4);      /* one: no other is ever picked */
+    check_picks(4, 1, 3, 0, 0, 0);
+    check_picks(4, 1, -1, 0, 0, 0);     /* a row of zeros */
+    check_picks(4, 2, -1, 2, 0, 0);
+    check_picks(4, 2, 0, -1, 0, 0);
+    check_picks(4, 2, -1, -1, 0, 0);
+    check_picks(4, 2, 2, 0, 0, 0);      /* y before x */
+    check_picks(4, 2, 1, 3, 0, 0);      /* velocities */
+    check_picks(4, 2, 0, 0, 0, 0);      /* x twice */
+    check_picks(1, 2, 0, 0, 0, 0);
+    check_picks(4, 3, 0, 2, -1, 0);     /* a third would be at no state */
+    check_picks(4, 3, 0, 2, 3, 0);
+    check_picks(9, 3, 0, 3, 5, 0);
+    check_picks(9, 3, 0, 3, 3, 0);
+    for (i = 0; i < 3 * 6; i++) {
+        int k;
+
+        make_picks(6, 3, at);
+        for (k = 0; k < 4; k++) {       /* another number, one more */
+            in.H[i] = not_one[k];
+            assert_int_equal(set(0), JL_OK);
+            assert_int_equal(rig.mode.every, 0);
+        }
+    }
+}
+
+/* Structure is of the present matrices, and of what was refused there is none:
+ * a NaN is no zero. */
+static void test_mode_structure_is_of_what_is_there(void **state)
+{
+    static const int at[2] = { 0, 2 };
+    const jl_motion motion = motion_of(JL_MOTION_CV, 2, 2, 0);
+    int i;
+
+    (void)state;
+    make(&rig, 4, 2, 2);
+    check_structure(&rig.mode, 4, 0);   /* of anything that may be put there */
+    assert_int_equal(jl_mode_motion(&rig.mode, &motion, 1), JL_OK);
+    check_structure(&rig.mode, 2, 2);
+    make_input(2, 2);
+    assert_int_equal(set(0), JL_OK);
+    check_structure(&rig.mode, 4, 0);
+    make(&rig, 4, 2, 2);
+    check_structure(&rig.mode, 4, 0);
+    make_picks(4, 2, at);
+    for (i = 0; i < 16; i++)
+        if (i / 8 != i % 4 / 2)
+            in.F[i] = 0;
+    assert_int_equal(set(0), JL_OK);
+    check_structure(&rig.mode, 2, 2);
+    check_poison(in.F, 16, NAN_, JL_ENONFINITE);
+    check_poison(in.H, 8, NAN_, JL_ENONFINITE);
+    check_structure(&rig.mode, 2, 2);
+    assert_int_equal(jl_mode_init(&rig.mode, 4, 2, 2, rig.mem + EDGE,
+                                  JL_MODE_MEM(4, 2, 2)), JL_OK);
+    check_structure(&rig.mode, 4, 0);
+}
+
 /* --- start -------------------------------------------------------------- */
 
 static int start_status(const jl_motion *motion, const jl_real *z, jl_real v,
@@ -1070,6 +1253,10 @@ int main(void)
         cmocka_unit_test(test_motion_composes),
         cmocka_unit_test(test_motion_refuses_sizes),
         cmocka_unit_test(test_motion_refuses_numbers),
+        cmocka_unit_test(test_motion_structure),
+        cmocka_unit_test(test_mode_set_finds_blocks),
+        cmocka_unit_test(test_mode_set_finds_what_is_picked),
+        cmocka_unit_test(test_mode_structure_is_of_what_is_there),
         cmocka_unit_test(test_start_state),
         cmocka_unit_test(test_start_refuses),
         cmocka_unit_test(test_chain_sojourn),
