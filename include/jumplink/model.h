@@ -26,7 +26,7 @@ typedef struct jl_mode jl_mode;
 struct jl_nonlinear;
 
 /* Matrices that are written by other means than jl_mode_set and jl_mode_motion
- * want `block` n and `every` 0, which is right for any: products leave out the
+ * want `block` and `every` 0, which is right for any: products leave out the
  * zeros that these promise. */
 struct jl_mode {
     int n, m, p;                /* states, measurements, noises             */
@@ -39,7 +39,8 @@ struct jl_mode {
     jl_real *N;                 /* [p,n] rows N_k of noise, and ...         */
     jl_real *q;                 /* [p]   their weights: W = sum q_k N_k' N_k */
     int block;                  /* F couples i, k only if i / block and k / block
-                                   are equal: the states of one axis; or n  */
+                                   are equal: the states of one axis; n, or 0:
+                                   any do                                   */
     int every;                  /* H picks states 0, every, 2 every, ..: the
                                    positions; or 0                          */
 

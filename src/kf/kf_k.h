@@ -89,7 +89,7 @@ JL_INLINE int jli_kf_predict(jl_real *xp, jl_real *Pp, const jl_mode *mode,
     jl_real *T = scratch + n * n, *U = T + n * n;
     int i, status;
 
-    if (mode->move == NULL && mode->block == b && b < n) {
+    if (mode->move == NULL && mode->block == b && b > 0 && b < n) {
         for (i = 0; i < n; i++) {
             const int at = i / b * b;
 
