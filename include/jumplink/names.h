@@ -74,6 +74,16 @@
 #define jl_imm_update_mode jl_imm_update_mode_f32
 #define jl_imm_judge jl_imm_judge_f32
 
+#define jl_cg_steady jl_cg_steady_f32
+#define jl_cg_cov jl_cg_cov_f32
+#define jl_cg_design jl_cg_design_f32
+#define jl_cg_coupling_of jl_cg_coupling_of_f32
+#define jl_cgimm_init jl_cgimm_init_f32
+#define jl_cgimm_set jl_cgimm_set_f32
+#define jl_cgimm_restart jl_cgimm_restart_f32
+#define jl_cgimm_step jl_cgimm_step_f32
+#define jl_cgimm_estimate jl_cgimm_estimate_f32
+
 #define jl_put_real jl_put_real_f32
 #define jl_get_real jl_get_real_f32
 #define jl_put_reals jl_put_reals_f32

@@ -14,7 +14,7 @@ chan      base
 model     base mat
 kf        base mat model
 imm       base mat model kf
-cgimm     base mat
+cgimm     base mat model
 mekf      base mat
 systolic  base mat mekf
 pf        base mat rng model
