@@ -162,11 +162,11 @@ $(BUILD)/obj_f32/tests/%.o: tests/%.c $(BUILD)/flags | golden generated
 	$(call compile,$(call TESTING,_f32) $(FLOAT))
 
 # The reference cases as C tables, so that the same test bodies run on a board.
-GOLDEN := $(if $(wildcard tests/golden/gen_golden.c),$(BUILD)/golden/imm_cases.h)
+GOLDEN := $(if $(wildcard tests/golden/gen_golden.c),$(patsubst %,$(BUILD)/golden/%_cases.h,imm cgimm))
 golden: $(GOLDEN)
-$(BUILD)/golden/imm_cases.h: $(BUILD)/gen_golden $(wildcard tests/golden/imm/*/*)
+$(BUILD)/golden/%_cases.h: $(BUILD)/gen_golden $(wildcard tests/golden/*/*/*)
 	@mkdir -p $(@D)
-	@echo '  $@'; $(BUILD)/gen_golden tests/golden/imm >$@
+	@echo '  $@'; $(BUILD)/gen_golden tests/golden/$* $* >$@
 $(BUILD)/gen_golden: tests/golden/gen_golden.c $(BUILD)/flags
 	@echo '  $@'; $(CC) $(HOST) $(CFLAGS) $< $(LIBS) -o $@
 
