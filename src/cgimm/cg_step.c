@@ -89,8 +89,9 @@ static void mix_two(jl_cgimm *cg, int t)
 {
     int owner = cg->gains[0].order < cg->gains[1].order;
 
+    /* of a component that mode t alone has, what comes from itself */
     between(cg->mixed + t * 3 * cg->axes, cg, cg->e[t], cg->gains[t].order,
-            owner == 0 ? cg->e[t] : 1 - cg->e[t], owner);
+            t == 0 ? cg->e[t] : 1 - cg->e[t], owner);
 }
 
 static void mix_all(jl_cgimm *cg, int t)
