@@ -204,10 +204,8 @@ int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z)
     JL_ASSERT(j >= 0 && j < cg->M);
     if (cg->stage == JLI_CG_IDLE)
         return JL_EORDER;
-    if (!is_usable(cg, z)) {
-        cg->stage = JLI_CG_IDLE;
+    if (!is_usable(cg, z))
         return JL_ENONFINITE;
-    }
     filter(cg, j, z);
     return JL_OK;
 }
