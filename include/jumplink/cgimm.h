@@ -105,13 +105,14 @@ typedef struct jl_cgimm {
     int order;                  /* the largest of the modes                 */
     jl_real T, R;
     const jl_cg_gains *gains;   /* [M]                                      */
+    int stage;                  /* what may come next; see the calls        */
 
     jl_real *mu;                /* [M]                                      */
     jl_real loglik;             /* of the last measurement; 0: there was none */
 
     /* For each mode; states are scaled, p, v T, a T^2 / 2, [axes,3]. */
     jl_real *x;                 /* [M,axes,3]                               */
-    jl_real *mixed;             /* [M,axes,3]                               */
+    jl_real *mixed;             /* [M,axes,3] mixed, then filtered, then x  */
     jl_real *xhat;              /* [axes,3]                                 */
     jl_real *w;                 /* [M,3] present gains, gamma / 4           */
     jl_real *goal;              /* [M,3] steady ones                        */
@@ -119,7 +120,8 @@ typedef struct jl_cgimm {
     jl_real *g;                 /* [M]   -1 / 2 S                           */
     jl_real *q;                 /* [M]   axes log(1 / 2 pi S) / 2           */
     jl_real *c;                 /* [M]   predicted probabilities            */
-    jl_real *l;                 /* [M]   g nu^2, the axes' sum              */
+    jl_real *l;                 /* [M]   the axes' sum of nu^2; weighed: g
+                                         times it                           */
     jl_real *moving;            /* [M]   0: gains are what they will be     */
     jl_real *e;                 /* [M]   work                               */
     jl_real *d;                 /* [axes,3] of two modes, x_0 - x_1         */
@@ -143,13 +145,31 @@ int jl_cgimm_init(jl_cgimm *cg, int M, const jl_cg_gains *gains, int axes,
  * Returns JL_OK, JL_ENONFINITE, JL_EPROB; unchanged on error. */
 int jl_cgimm_set(jl_cgimm *cg, const jl_real *x, const jl_real *mu);
 
-/* Let mode j's gains start again, as when a target is met anew. */
+/* Let mode j's gains start again, as when a target is met anew.  Ends a step
+ * under way, as jl_cgimm_set does. */
 void jl_cgimm_restart(jl_cgimm *cg, int j);
 
 /* One step with z [axes]; NULL: no measurement, all is predicted, gains wait.
  * Returns JL_OK, or JL_ENONFINITE (z not finite or beyond JL_LARGE): unchanged
  * then. */
 int jl_cgimm_step(jl_cgimm *cg, const jl_real *z);
+
+/* The stages of a step, for filters spread over several processors (par.h):
+ * foresee, then mix_mode and filter_mode for every j, weigh, combine.  A
+ * processor mixes and filters the modes it owns; mixed[j], l[j] of the others
+ * come to it by message; then, if no mode has failed anywhere, it weighs, which
+ * also advances all gains, and combines.  (It must own a mode: filter_mode
+ * opens weigh.)  Until weigh the filter is as before the step.
+ * 0 <= j < M; z the same in filter_mode and weigh, which asks only whether it
+ * is NULL.  foresee may be called at any time and starts the step anew, combine
+ * right after weigh only: it has what the next mixing needs.
+ * filter_mode and weigh return JL_OK, JL_EORDER (filter without foresee, weigh
+ * without filter or after a failure), filter_mode JL_ENONFINITE (z). */
+void jl_cgimm_foresee(jl_cgimm *cg);
+void jl_cgimm_mix_mode(jl_cgimm *cg, int j);
+int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z);
+int jl_cgimm_weigh(jl_cgimm *cg, const jl_real *z);
+void jl_cgimm_combine(jl_cgimm *cg);
 
 /* The combined state x [axes,order], as jl_cgimm_set has it. */
 void jl_cgimm_estimate(const jl_cgimm *cg, jl_real *x);

@@ -6,13 +6,14 @@
 
 #if JL_REAL_FLOAT
 #define jli_cg_stable jli_cg_stable_f32
-#define jli_cg_combine jli_cg_combine_f32
 #endif
 
 /* 1 if w [order] are the gains of a stable filter with 0 < alpha < 1. */
 int jli_cg_stable(const jl_real *w, int order);
 
-/* xhat, and of two modes d, of the present x and mu. */
-void jli_cg_combine(jl_cgimm *cg);
+/* What may come next in a step under way. */
+enum {
+    JLI_CG_IDLE = 0, JLI_CG_MIXED = 1, JLI_CG_FILTERED = 2
+};
 
 #endif

@@ -2,7 +2,10 @@
  *
  * Of two modes differences are formed once, d = x_0 - x_1, and used three times:
  * xhat = x_1 + mu_0 d, and in the next step x0_t = x_1 + mu_0t d.  A state that
- * only one mode has is that mode's share of it. */
+ * only one mode has is that mode's share of it.
+ *
+ * Modes are mixed and filtered in `mixed`; weigh, which cannot fail, makes that
+ * the state, and the gains used the present ones. */
 #include "cgimm/cg_gains.h"
 
 #include <string.h>
@@ -39,11 +42,11 @@ static void between(jl_real *x, const jl_cgimm *cg, jl_real share,
     }
 }
 
-static void mix_two(jl_cgimm *cg)
+/* e[t] is the share of mode 0 in mode t's mixture. */
+static void foresee_two(jl_cgimm *cg)
 {
     const jl_real *Pi = cg->Pi;
-    int owner = cg->gains[0].order < cg->gains[1].order;
-    jl_real from_0[2], from_1[2], share;
+    jl_real from_0[2], from_1[2];
     int t;
 
     from_0[0] = Pi[0] * cg->mu[0];
@@ -54,55 +57,99 @@ static void mix_two(jl_cgimm *cg)
         from_1[1] = 0;
     for (t = 0; t < 2; t++) {
         cg->c[t] = from_0[t] + from_1[t];
-        share = cg->c[t] > 0 ? from_0[t] / cg->c[t] : (jl_real)(t == 0);
-        between(cg->mixed + t * 3 * cg->axes, cg, share, cg->gains[t].order,
-                owner == 0 ? share : 1 - share, owner);
+        cg->e[t] = cg->c[t] > 0 ? from_0[t] / cg->c[t] : (jl_real)(t == 0);
     }
 }
 
-static void mix_mode(jl_cgimm *cg, int t)
+/* e[t] is 1 / c_t, or 0 if the mode cannot be entered. */
+static void foresee_all(jl_cgimm *cg)
 {
-    int M = cg->M, state = 3 * cg->axes, i, s;
-    jl_real *x = cg->mixed + t * state, c = 0, r;
+    int M = cg->M, s, t;
 
-    for (s = 0; s < M; s++) {
-        cg->e[s] = cg->Pi[s * M + t] * cg->mu[s];
-        c += cg->e[s];
+    for (t = 0; t < M; t++) {
+        jl_real c = 0;
+
+        for (s = 0; s < M; s++)
+            c += cg->Pi[s * M + t] * cg->mu[s];
+        cg->c[t] = c;
+        cg->e[t] = c > 0 ? 1 / c : 0;
     }
-    cg->c[t] = c;
-    if (!(c > 0)) {                     /* cannot be entered */
+}
+
+void jl_cgimm_foresee(jl_cgimm *cg)
+{
+    if (cg->M == 2)
+        foresee_two(cg);
+    else
+        foresee_all(cg);
+    cg->stage = JLI_CG_MIXED;
+}
+
+static void mix_two(jl_cgimm *cg, int t)
+{
+    int owner = cg->gains[0].order < cg->gains[1].order;
+
+    /* of a component that mode t alone has, what comes from itself */
+    between(cg->mixed + t * 3 * cg->axes, cg, cg->e[t], cg->gains[t].order,
+            t == 0 ? cg->e[t] : 1 - cg->e[t], owner);
+}
+
+static void mix_all(jl_cgimm *cg, int t)
+{
+    int M = cg->M, state = 3 * cg->axes, order = cg->gains[t].order, i, s, a;
+    jl_real *x = cg->mixed + t * state;
+
+    if (!(cg->c[t] > 0)) {              /* cannot be entered */
         memcpy(x, cg->x + t * state, (size_t)state * sizeof *x);
         return;
     }
-    r = 1 / c;
     memset(x, 0, (size_t)state * sizeof *x);
     for (s = 0; s < M; s++) {
-        const jl_real share = cg->e[s] * r, *xs = cg->x + s * state;
+        const jl_real share = cg->Pi[s * M + t] * cg->mu[s] * cg->e[t];
+        const jl_real *xs = cg->x + s * state;
 
-        for (i = 0; i < state; i++)
-            x[i] += share * xs[i];
+        for (a = 0; a < state; a += 3)
+            for (i = a; i < a + order; i++)
+                x[i] += share * xs[i];
     }
+}
+
+void jl_cgimm_mix_mode(jl_cgimm *cg, int j)
+{
+    JL_ASSERT(j >= 0 && j < cg->M);
+    if (cg->M == 2)
+        mix_two(cg, j);
+    else
+        mix_all(cg, j);
 }
 
 /* --- gains --------------------------------------------------------------- */
 
-static void advance(jl_cgimm *cg, int j)
+/* What mode j's gains w become by a measurement; w may be the present ones.
+ * Returns 1 if they will move on. */
+static int next_gains(jl_real *w, const jl_cgimm *cg, int j)
 {
-    jl_real *w = cg->w + 3 * j, rest;
+    const jl_real *now = cg->w + 3 * j;
     const jl_real *goal = cg->goal + 3 * j, *rate = cg->rate + 3 * j;
     int i, order = cg->gains[j].order, there = 1;
 
     for (i = 0; i < order; i++) {
-        jl_real left = goal[i] - w[i];
+        jl_real left = goal[i] - now[i];
 
-        w[i] += rate[i] * left;
+        w[i] = now[i] + rate[i] * left;
         there &= left <= 2 * JL_EPSILON && left >= -2 * JL_EPSILON;
     }
-    if (there) {
+    if (there)
         memcpy(w, goal, (size_t)order * sizeof *w);
-        cg->moving[j] = 0;
-    }
-    rest = 1 - w[0];
+    return !there;
+}
+
+static void advance(jl_cgimm *cg, int j)
+{
+    jl_real rest;
+
+    cg->moving[j] = (jl_real)next_gains(cg->w + 3 * j, cg, j);
+    rest = 1 - cg->w[3 * j];
     cg->g[j] = -rest / (2 * cg->R);
     cg->q[j] = (jl_real)cg->axes * (jl_log(rest / cg->R) - LOG_2PI) / 2;
 }
@@ -122,13 +169,16 @@ static void predict(jl_real *x, int order)
     }
 }
 
-static void filter_mode(jl_cgimm *cg, int j, const jl_real *z)
+static void filter(jl_cgimm *cg, int j, const jl_real *z)
 {
-    int order = cg->gains[j].order, state = 3 * cg->axes, a, i;
-    const jl_real *mixed = cg->mixed + j * state, *w = cg->w + 3 * j;
-    jl_real *x = cg->x + j * state, sum = 0;
+    int order = cg->gains[j].order, a, i;
+    jl_real *x = cg->mixed + j * 3 * cg->axes, next[3], sum = 0;
+    const jl_real *w = cg->w + 3 * j;
 
-    memcpy(x, mixed, (size_t)state * sizeof *x);
+    if (z != NULL && cg->moving[j] > 0) {
+        (void)next_gains(next, cg, j);
+        w = next;
+    }
     for (a = 0; a < cg->axes; a++, x += 3) {
         jl_real nu;
 
@@ -140,9 +190,24 @@ static void filter_mode(jl_cgimm *cg, int j, const jl_real *z)
             x[i] += w[i] * nu;
         sum = a == 0 ? nu * nu : sum + nu * nu;
     }
-    cg->l[j] = cg->g[j] * sum;
-    if (!(cg->l[j] >= -JL_REAL_MAX))
-        cg->l[j] = -JL_REAL_MAX;
+    cg->l[j] = sum;
+    cg->stage = JLI_CG_FILTERED;
+}
+
+static int is_usable(const jl_cgimm *cg, const jl_real *z)
+{
+    return z == NULL || jl_vec_within(z, cg->axes, JL_LARGE);
+}
+
+int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z)
+{
+    JL_ASSERT(j >= 0 && j < cg->M);
+    if (cg->stage == JLI_CG_IDLE)
+        return JL_EORDER;
+    if (!is_usable(cg, z))
+        return JL_ENONFINITE;
+    filter(cg, j, z);
+    return JL_OK;
 }
 
 /* --- weigh --------------------------------------------------------------- */
@@ -182,6 +247,41 @@ static void weigh_all(jl_cgimm *cg)
     cg->loglik = best + jl_log(sum);
 }
 
+static void weigh(jl_cgimm *cg)
+{
+    int j;
+
+    for (j = 0; j < cg->M; j++) {
+        if (cg->moving[j] > 0)
+            advance(cg, j);
+        cg->l[j] *= cg->g[j];
+        if (!(cg->l[j] >= -JL_REAL_MAX))
+            cg->l[j] = -JL_REAL_MAX;
+    }
+    if (cg->M == 2)
+        weigh_two(cg);
+    else
+        weigh_all(cg);
+}
+
+int jl_cgimm_weigh(jl_cgimm *cg, const jl_real *z)
+{
+    jl_real *x = cg->x;
+
+    if (cg->stage != JLI_CG_FILTERED)
+        return JL_EORDER;
+    if (z != NULL) {
+        weigh(cg);
+    } else {
+        memcpy(cg->mu, cg->c, (size_t)cg->M * sizeof *cg->mu);
+        cg->loglik = 0;
+    }
+    cg->x = cg->mixed;
+    cg->mixed = x;
+    cg->stage = JLI_CG_IDLE;
+    return JL_OK;
+}
+
 /* --- combine ------------------------------------------------------------- */
 
 static void combine_two(jl_cgimm *cg)
@@ -196,7 +296,7 @@ static void combine_two(jl_cgimm *cg)
     between(cg->xhat, cg, cg->mu[0], cg->order, cg->mu[owner], owner);
 }
 
-void jli_cg_combine(jl_cgimm *cg)
+void jl_cgimm_combine(jl_cgimm *cg)
 {
     int state = 3 * cg->axes, i, j;
 
@@ -212,27 +312,16 @@ void jli_cg_combine(jl_cgimm *cg)
 
 int jl_cgimm_step(jl_cgimm *cg, const jl_real *z)
 {
-    int M = cg->M, j;
+    int j;
 
-    if (z != NULL && !jl_vec_within(z, cg->axes, JL_LARGE))
+    if (!is_usable(cg, z))
         return JL_ENONFINITE;
-    if (M == 2)
-        mix_two(cg);
-    for (j = 0; j < M && M != 2; j++)
-        mix_mode(cg, j);
-    for (j = 0; j < M; j++) {
-        if (z != NULL && cg->moving[j] > 0)
-            advance(cg, j);
-        filter_mode(cg, j, z);
+    jl_cgimm_foresee(cg);
+    for (j = 0; j < cg->M; j++) {
+        jl_cgimm_mix_mode(cg, j);
+        filter(cg, j, z);
     }
-    if (z == NULL) {
-        memcpy(cg->mu, cg->c, (size_t)M * sizeof *cg->mu);
-        cg->loglik = 0;
-    } else if (M == 2) {
-        weigh_two(cg);
-    } else {
-        weigh_all(cg);
-    }
-    jli_cg_combine(cg);
+    (void)jl_cgimm_weigh(cg, z);
+    jl_cgimm_combine(cg);
     return JL_OK;
 }

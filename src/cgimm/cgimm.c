@@ -49,7 +49,7 @@ static void start(jl_cgimm *cg, const jl_real *mu)
         jl_cgimm_restart(cg, j);
     }
     cg->loglik = 0;
-    jli_cg_combine(cg);
+    jl_cgimm_combine(cg);
 }
 
 static int check_gains(const jl_cg_gains *g)
@@ -141,6 +141,7 @@ void jl_cgimm_restart(jl_cgimm *cg, int j)
     cg->w[3 * j + 1] = g->start[1];
     cg->w[3 * j + 2] = g->order == 3 ? g->start[2] / 2 : 0;
     cg->moving[j] = 1;
+    cg->stage = JLI_CG_IDLE;
 }
 
 void jl_cgimm_estimate(const jl_cgimm *cg, jl_real *x)
