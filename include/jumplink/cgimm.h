@@ -119,6 +119,7 @@ typedef struct jl_cgimm {
     jl_real *rate;              /* [M,3] 1 - exp(-1/k)                      */
     jl_real *g;                 /* [M]   -1 / 2 S                           */
     jl_real *q;                 /* [M]   axes log(1 / 2 pi S) / 2           */
+    jl_real q_more;             /* of two modes, q_0 - q_1                  */
     jl_real *c;                 /* [M]   predicted probabilities            */
     jl_real *l;                 /* [M]   the axes' sum of nu^2; weighed: g
                                          times it                           */

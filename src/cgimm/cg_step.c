@@ -42,19 +42,18 @@ static void between(jl_real *x, const jl_cgimm *cg, jl_real share,
     }
 }
 
-/* e[t] is the share of mode 0 in mode t's mixture. */
+/* e[t] is the share of mode 0 in mode t's mixture.  A row of Pi sums to 1: the
+ * larger part of mu_1 is what the smaller one leaves. */
 static void foresee_two(jl_cgimm *cg)
 {
     const jl_real *Pi = cg->Pi;
+    int less = Pi[2] > Pi[3], t;
     jl_real from_0[2], from_1[2];
-    int t;
 
     from_0[0] = Pi[0] * cg->mu[0];
     from_0[1] = Pi[1] * cg->mu[0];
-    from_1[0] = Pi[2] * cg->mu[1];
-    from_1[1] = cg->mu[1] - from_1[0];
-    if (from_1[1] < 0)                  /* rows sum to 1, nearly */
-        from_1[1] = 0;
+    from_1[less] = Pi[2 + less] * cg->mu[1];
+    from_1[1 - less] = cg->mu[1] - from_1[less];
     for (t = 0; t < 2; t++) {
         cg->c[t] = from_0[t] + from_1[t];
         cg->e[t] = cg->c[t] > 0 ? from_0[t] / cg->c[t] : (jl_real)(t == 0);
@@ -152,6 +151,8 @@ static void advance(jl_cgimm *cg, int j)
     rest = 1 - cg->w[3 * j];
     cg->g[j] = -rest / (2 * cg->R);
     cg->q[j] = (jl_real)cg->axes * (jl_log(rest / cg->R) - LOG_2PI) / 2;
+    if (cg->M == 2)
+        cg->q_more = cg->q[0] - cg->q[1];
 }
 
 /* --- filter -------------------------------------------------------------- */
@@ -216,7 +217,7 @@ int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z)
 static void weigh_two(jl_cgimm *cg)
 {
     const jl_real *l = cg->l, *q = cg->q, *c = cg->c;
-    jl_real more = (q[0] - q[1]) + l[0] - l[1], other, sum;
+    jl_real more = cg->q_more + l[0] - l[1], other, sum;
     int best = c[0] > 0 && (more > 0 || !(c[1] > 0)) ? 0 : 1;
 
     other = c[1 - best] * jl_exp(best == 0 ? -more : more);
