@@ -13,7 +13,8 @@
  *     weigh    S = R / (1 - alpha),  l_t = sum over axes log N(nu; 0, S)
  *              mu_t = c_t exp(l_t) / sum of them
  *     combine  xhat = sum_t mu_t x_t
- * S = R / (1 - alpha) is exact for the gains of a Kalman filter.
+ * S = R / (1 - alpha) is exact for the gains of a Kalman filter.  A c_t below
+ * JL_REAL_MIN is 0: a mode that is entered from no other may be lost for good.
  *
  * Two modes of order 2 and 3 with steady gains, one axis: 24 multiplications
  * and divisions, 27 additions, an exponential (tests/count), where the paper

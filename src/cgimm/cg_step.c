@@ -56,7 +56,12 @@ static void foresee_two(jl_cgimm *cg)
     from_1[1 - less] = cg->mu[1] - from_1[less];
     for (t = 0; t < 2; t++) {
         cg->c[t] = from_0[t] + from_1[t];
-        cg->e[t] = cg->c[t] > 0 ? from_0[t] / cg->c[t] : (jl_real)(t == 0);
+        if (cg->c[t] >= JL_REAL_MIN) {
+            cg->e[t] = from_0[t] / cg->c[t];
+        } else {
+            cg->c[t] = 0;
+            cg->e[t] = (jl_real)(t == 0);
+        }
     }
 }
 
@@ -70,8 +75,8 @@ static void foresee_all(jl_cgimm *cg)
 
         for (s = 0; s < M; s++)
             c += cg->Pi[s * M + t] * cg->mu[s];
-        cg->c[t] = c;
-        cg->e[t] = c > 0 ? 1 / c : 0;
+        cg->c[t] = c >= JL_REAL_MIN ? c : 0;
+        cg->e[t] = c >= JL_REAL_MIN ? 1 / c : 0;
     }
 }
 
@@ -213,19 +218,21 @@ int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z)
 
 /* --- weigh --------------------------------------------------------------- */
 
-/* By the better mode's likelihood, so that nothing overflows. */
+/* By the better mode's likelihood, so that nothing overflows.  The larger mu is
+ * what the smaller one leaves, which so keeps its digits. */
 static void weigh_two(jl_cgimm *cg)
 {
     const jl_real *l = cg->l, *q = cg->q, *c = cg->c;
     jl_real more = cg->q_more + l[0] - l[1], other, sum;
-    int best = c[0] > 0 && (more > 0 || !(c[1] > 0)) ? 0 : 1;
+    int best = c[0] > 0 && (more > 0 || !(c[1] > 0)) ? 0 : 1, less;
 
     other = c[1 - best] * jl_exp(best == 0 ? -more : more);
     if (!(c[1 - best] > 0))
         other = 0;
     sum = c[best] + other;
-    cg->mu[1 - best] = other / sum;
-    cg->mu[best] = 1 - cg->mu[1 - best];
+    less = other < c[best] ? 1 - best : best;
+    cg->mu[less] = (less == best ? c[best] : other) / sum;
+    cg->mu[1 - less] = 1 - cg->mu[less];
     cg->loglik = q[best] + l[best] + jl_log(sum);
 }
 
