@@ -405,13 +405,14 @@ static void test_cgimm_step_is_its_stages(void **state)
 static void test_cgimm_survives_outliers(void **state)
 {
     static const jl_real far[] = { JL_C(5e6), JL_LARGE, -JL_LARGE, JL_LARGE };
-    struct setting s = { 0, 2, { 2, 3, 3, 2, 3 }, 1, 50, NULL, NULL };
+    struct setting s = { 0, 2, { 2, 3, 3, 2, 3 }, 1, 0, NULL, NULL };
     jl_real z[AXES], x[AXES * 3];
     int c, f, k, i;
 
     (void)state;
     for (c = 0; c < CHAINS; c++)
-        for (f = 0; f < 3; f++) {
+        for (f = 0; f < 6; f++) {
+            s.sigma = f < 3 ? 50 : 1e-6;        /* (far / 1e-6)^2 overflows */
             s.M = chains[c].M;
             s.Pi = chains[c].Pi;
             s.mu = chains[c].mu;
@@ -421,9 +422,9 @@ static void test_cgimm_survives_outliers(void **state)
 
                 (void)measured(z, &s, k);
                 if (k % 10 == 5)
-                    z[0] = far[f];
-                if (k % 10 == 5 && f > 0)
-                    z[1] = far[f + k / 10 % 2];
+                    z[0] = far[f % 3];
+                if (k % 10 == 5 && f % 3 > 0)
+                    z[1] = far[f % 3 + k / 10 % 2];
                 assert_int_equal(jl_cgimm_step(&rig.cg, z), JL_OK);
                 jl_cgimm_estimate(&rig.cg, x);
                 for (i = 0; i < 2 * rig.cg.order; i++)
@@ -436,6 +437,29 @@ static void test_cgimm_survives_outliers(void **state)
                 assert_close(sum, 1, 8 * EPS);
             }
         }
+}
+
+/* 1 / c_t overflows. */
+static void test_cgimm_survives_the_least_probabilities(void **state)
+{
+    const double least = (double)JL_REAL_MIN / 16;
+    const double mu[] = { 1, least, 0 };
+    struct setting s = { 0, 1, { 2, 3, 3 }, 1, 50, NULL, mu };
+    jl_real z[AXES];
+    int M, k, i;
+
+    (void)state;
+    for (M = 2; M <= 3; M++) {
+        s.M = M;
+        s.Pi = M == 2 ? apart : held;
+        open_rig(&rig, &s);
+        for (k = 0; k < 8; k++) {
+            assert_int_equal(jl_cgimm_step(&rig.cg, measured(z, &s, k)), JL_OK);
+            for (i = 0; i < 3; i++)
+                assert_true(isfinite((double)rig.cg.xhat[i]));
+            assert_close(rig.cg.mu[0], 1, 8 * EPS);
+        }
+    }
 }
 
 /* --- memory and refusals ------------------------------------------------- */
@@ -594,6 +618,7 @@ int main(void)
         cmocka_unit_test(test_cgimm_two_modes_are_two_of_three),
         cmocka_unit_test(test_cgimm_step_is_its_stages),
         cmocka_unit_test(test_cgimm_survives_outliers),
+        cmocka_unit_test(test_cgimm_survives_the_least_probabilities),
         cmocka_unit_test(test_cgimm_keeps_to_its_memory),
         cmocka_unit_test(test_cgimm_init_refuses),
         cmocka_unit_test(test_cgimm_refuses_what_is_not_finite),
