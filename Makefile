@@ -161,12 +161,25 @@ $(BUILD)/obj/tests/%.o: tests/%.c $(BUILD)/flags | golden generated
 $(BUILD)/obj_f32/tests/%.o: tests/%.c $(BUILD)/flags | golden generated
 	$(call compile,$(call TESTING,_f32) $(FLOAT))
 
+# Operations, counted: sources as C++, with a jl_real that counts.  Without the
+# words for several numbers at once, which are of the machine's own types.
+COUNTED := $(patsubst %.c,$(BUILD)/count/%.o,$(wildcard $(patsubst %,src/%/*.c,mat model kf imm cgimm)))
+COUNTING = $(CXX) -std=c++11 -Wall -Wextra -Wno-missing-field-initializers -U__SSE2__ -U__ARM_NEON \
+    $(EXACT) '-DJL_REAL_FILE="count/counted.hh"' -Iinclude -Isrc -Itests $(CFLAGS) -MMD -MP
+TESTS += $(BUILD)/tests/test_count
+$(BUILD)/count/%.o: %.c $(BUILD)/flags
+	@mkdir -p $(@D); echo '  $@'; $(COUNTING) -x c++ -c $< -o $@
+$(BUILD)/count/%.o: %.cc $(BUILD)/flags
+	@mkdir -p $(@D); echo '  $@'; $(COUNTING) -c $< -o $@
+$(BUILD)/tests/test_count: $(BUILD)/count/tests/count/test_count.o $(COUNTED)
+	@mkdir -p $(@D); echo '  $@'; $(CXX) $(CFLAGS) $^ -lcmocka -lm -o $@
+
 # The reference cases as C tables, so that the same test bodies run on a board.
-GOLDEN := $(if $(wildcard tests/golden/gen_golden.c),$(BUILD)/golden/imm_cases.h)
+GOLDEN := $(if $(wildcard tests/golden/gen_golden.c),$(patsubst %,$(BUILD)/golden/%_cases.h,imm cgimm))
 golden: $(GOLDEN)
-$(BUILD)/golden/imm_cases.h: $(BUILD)/gen_golden $(wildcard tests/golden/imm/*/*)
+$(BUILD)/golden/%_cases.h: $(BUILD)/gen_golden $(wildcard tests/golden/*/*/*)
 	@mkdir -p $(@D)
-	@echo '  $@'; $(BUILD)/gen_golden tests/golden/imm >$@
+	@echo '  $@'; $(BUILD)/gen_golden tests/golden/$* $* >$@
 $(BUILD)/gen_golden: tests/golden/gen_golden.c $(BUILD)/flags
 	@echo '  $@'; $(CC) $(HOST) $(CFLAGS) $< $(LIBS) -o $@
 

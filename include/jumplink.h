@@ -32,6 +32,7 @@
 #include "jumplink/model.h"
 #include "jumplink/kf.h"
 #include "jumplink/imm.h"
+#include "jumplink/cgimm.h"
 #include "jumplink/chan.h"
 #include "jumplink/wire.h"
 #include "jumplink/link.h"

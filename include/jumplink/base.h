@@ -10,13 +10,11 @@
 #include "config.h"
 #include "names.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
 /* --- numbers ----------------------------------------------------------- */
 
-#if JL_REAL_FLOAT
+#ifdef JL_REAL_FILE
+#include JL_REAL_FILE
+#elif JL_REAL_FLOAT
 typedef float jl_real;
 #define JL_C(x) x##f                    /* a constant of type jl_real */
 #define JL_EPSILON FLT_EPSILON
@@ -34,6 +32,10 @@ typedef double jl_real;
 /* JL_LARGE: the largest magnitude a state component may have, and its square
  * the largest a covariance may have: so the sums of squares in mixing and
  * combining cannot overflow, and those stages cannot fail. */
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /* At least 32 bits; the library keeps values below 2^32 in it. */
 #if UINT_MAX >= 4294967295UL

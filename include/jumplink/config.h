@@ -19,6 +19,12 @@
 #error "JL_REAL_FLOAT is 0 (double) or 1 (float)"
 #endif
 
+/* A file that defines jl_real, and JL_C to JL_LARGE of base.h, otherwise: for
+ * measurements of the code itself, compiled as C++ (tests/count). */
+#if defined(JL_REAL_FILE) && JL_REAL_FLOAT
+#error "JL_REAL_FILE says what jl_real is: JL_REAL_FLOAT must be 0"
+#endif
+
 /* Largest sizes that an init accepts.  They cost nothing by themselves: the
  * memory is the caller's; they only keep the size products inside an int of 32
  * bits (where int has 16, JL_IMM_STATE and the like must stay below 32768). */

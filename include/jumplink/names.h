@@ -74,6 +74,21 @@
 #define jl_imm_update_mode jl_imm_update_mode_f32
 #define jl_imm_judge jl_imm_judge_f32
 
+#define jl_cg_steady jl_cg_steady_f32
+#define jl_cg_cov jl_cg_cov_f32
+#define jl_cg_design jl_cg_design_f32
+#define jl_cg_coupling_of jl_cg_coupling_of_f32
+#define jl_cgimm_init jl_cgimm_init_f32
+#define jl_cgimm_set jl_cgimm_set_f32
+#define jl_cgimm_restart jl_cgimm_restart_f32
+#define jl_cgimm_step jl_cgimm_step_f32
+#define jl_cgimm_foresee jl_cgimm_foresee_f32
+#define jl_cgimm_mix_mode jl_cgimm_mix_mode_f32
+#define jl_cgimm_filter_mode jl_cgimm_filter_mode_f32
+#define jl_cgimm_weigh jl_cgimm_weigh_f32
+#define jl_cgimm_combine jl_cgimm_combine_f32
+#define jl_cgimm_estimate jl_cgimm_estimate_f32
+
 #define jl_put_real jl_put_real_f32
 #define jl_get_real jl_get_real_f32
 #define jl_put_reals jl_put_reals_f32
@@ -85,6 +100,7 @@
 #define jl_host_stop jl_host_stop_f32
 #define jl_par_deal jl_par_deal_f32
 #define jl_par_init jl_par_init_f32
+#define jl_par_init_cg jl_par_init_cg_f32
 #define jl_par_serve jl_par_serve_f32
 #define jl_par_step jl_par_step_f32
 #define jl_par_ahead jl_par_ahead_f32

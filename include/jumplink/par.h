@@ -13,6 +13,12 @@
  * filter.
  * (Pan, Dai, Zhang 1997, sections 3-6, with their three exchanges made one.)
  *
+ * A constant-gain IMM (cgimm.h) is spread likewise, with the bits of
+ * jl_cgimm_step; its exchange has (status, nu^2, x_j) of a mode: of one axis
+ * 2 + 8 (order + 1) octets, and 8 for the message.  Two PEs with a mode of order
+ * 2 and one of 3 send 34 and 42 octets a step, where an IMM of 3 states sends
+ * twice 90.
+ *
  * For sticky chains (imm.h) the exchange may instead be an all-reduce, whose
  * messages hold, whatever the number of modes, one estimate a PE: what mixing
  * needs of the others' modes is their pool.
@@ -33,6 +39,7 @@
 #define JL_PAR_H
 
 #include "base.h"
+#include "cgimm.h"
 #include "chan.h"
 #include "imm.h"
 #include "plan.h"
@@ -62,7 +69,7 @@ typedef struct jl_estimate {
                                    also of one that a record starts with    */
     jl_real loglik;
     jl_real *x;                 /* [n]                                      */
-    jl_real *P;                 /* [n,n]                                    */
+    jl_real *P;                 /* [n,n]; NULL: of a jl_cgimm, has none     */
     jl_real *mu;                /* [M]                                      */
     int failed_pe;              /* the PE that PE0 gave up; -1: none        */
 } jl_estimate;
@@ -76,6 +83,13 @@ typedef struct jl_estimate {
 
 /* Octets of a PE's buffer: a message out and a message in. */
 #define JL_PAR_BUF(M, n, m) (2 * JL_PAR_MSG(M, n, m))
+
+/* Of a jl_cgimm. */
+#define JL_PAR_CG_MODE(axes) (2 + (1 + 3 * (axes)) * JL_REAL_OCTETS)
+#define JL_PAR_CG_MSG(M, axes) \
+    (16 + (M) * JL_PAR_CG_MODE(axes) \
+     + ((M) + 4 * (axes) + 2) * JL_REAL_OCTETS)
+#define JL_PAR_CG_BUF(M, axes) (2 * JL_PAR_CG_MSG(M, axes))
 
 /* --- the host's side --------------------------------------------------- */
 
@@ -94,8 +108,9 @@ int jl_host_ready(jl_chan *from_pe0, jl_u32 fingerprint, int *failed_pe,
 int jl_host_send(jl_chan *to_pe0, const jl_meas *meas, int m,
                  unsigned char *buf, int cap, long timeout_us);
 
-/* Receive the answer; x [n], P [n,n], mu [M] of *estimate are the caller's.
- * buf [cap], cap >= JL_PAR_MSG(M, n, 1).
+/* Receive the answer; x [n], P [n,n], mu [M] of *estimate are the caller's.  Of
+ * a jl_cgimm n is axes * order, and P must be NULL.
+ * buf [cap], cap >= JL_PAR_MSG(M, n, 1), or JL_PAR_CG_MSG(M, axes).
  * Returns JL_OK (look at estimate->status), JL_EMSG, JL_ELENGTH, or the
  * channel's error; or, when PE0 cannot go on because of another PE, the error
  * of that channel, with estimate->failed_pe: the run is over. */
@@ -120,6 +135,12 @@ int jl_host_stop(jl_chan *to_pe0, unsigned char *buf, int cap,
 #define JL_STARTED 1
 typedef int (*jl_prepare)(void *context, jl_imm *imm, const jl_meas *meas);
 
+/* The same of a jl_cgimm, to start it (jl_cgimm_set), let its gains start again
+ * (jl_cgimm_restart), or refuse a dt that is not its T, which is not looked at
+ * elsewhere. */
+typedef int (*jl_prepare_cg)(void *context, jl_cgimm *cg,
+                             const jl_meas *meas);
+
 enum {                          /* what the exchange carries */
     JL_EXCHANGE_GATHER = 0,     /* every mode's estimate                    */
     JL_EXCHANGE_REDUCE = 1      /* ... every PE's pool: sticky chains only  */
@@ -137,6 +158,7 @@ typedef struct jl_par_config {
     jl_chan *to_host;           /* PE0 only                                 */
     jl_chan *from_host;
     jl_prepare prepare;         /* or NULL: the model does not change       */
+    jl_prepare_cg prepare_cg;   /* ... of a jl_cgimm                        */
     void *context;
     jl_u32 fingerprint;         /* of the model: equal on all PEs and host  */
     long start_us;              /* longest wait for the others at the start */
@@ -149,7 +171,11 @@ typedef struct jl_par_config {
 
 typedef struct jl_par {
     jl_par_config config;
-    jl_imm *imm;
+    const struct jl_par_kind *kind;     /* of filter                        */
+    jl_imm *imm;                /* the filter, or NULL                      */
+    jl_cgimm *cg;               /* ... the other                            */
+    int M, n, m;                /* modes, states, components of z           */
+    jl_real *l;                 /* [M] the filter's                         */
     int active;                 /* PEs that own modes                       */
     int ahead;                  /* own modes are already mixed, predicted   */
     int failed;                 /* JL_OK, or the error of a channel         */
@@ -158,6 +184,7 @@ typedef struct jl_par {
     int hop_count;
     jl_real *pool;              /* [n + n*n] of the own modes (all-reduce)  */
     jl_u32 seq;                 /* of the last measurement                  */
+    int verdict;                /* ... on it, if it was not refused         */
     unsigned long steps;        /* measurements used, failed steps too      */
     unsigned long refused;      /* ... and refused, with their code         */
     unsigned char *buf;         /* [cap]                                    */
@@ -180,12 +207,17 @@ void jl_par_deal(unsigned char *owner, int M, int npe);
 int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
                 unsigned char *buf, int cap, int *status, jl_real *z);
 
+/* The same for a constant-gain IMM: cap >= JL_PAR_CG_BUF(M, axes), z [axes].
+ * Also returns JL_ECHAIN for an all-reduce, which it cannot have. */
+int jl_par_init_cg(jl_par *par, jl_cgimm *cg, const jl_par_config *config,
+                   unsigned char *buf, int cap, int *status, jl_real *z);
+
 /* Serve until the host says stop: first all PEs tell PE0 that they are ready,
  * and PE0 tells them and the host that all are; then step after step.  A
  * measurement that cannot be used (not of the model's size, not finite, without
  * a gate also beyond JL_LARGE, a number or a time that goes back) is refused:
- * the host is told why.  scratch [JL_IMM_SCRATCH(M, n, m)], for all three calls;
- * `prepare` may use it too.
+ * the host is told why.  scratch [JL_IMM_SCRATCH(M, n, m)], of a jl_cgimm
+ * [3 axes], for all three calls; `prepare` may use it too.
  * Returns JL_OK after a stop, JL_EMODEL (the fingerprints differ), or the error
  * of the channel that failed, here or at another PE: par->failed_pe says to
  * which PE, the one that is to blame as far as this PE was told. */
@@ -197,7 +229,8 @@ int jl_par_serve(jl_par *par, jl_real *scratch);
  * chain that is not sticky), JL_EGATE (an all-reduce and a gate: a PE's pool
  * would depend on the verdict of all); or the error of the channel that failed.
  * The combined estimate is computed on PE0 (on the others call jl_imm_combine;
- * an all-reduce computes it on all, and jl_imm_combine is of no use).  Of nis,
+ * an all-reduce computes it on all, and jl_imm_combine is of no use; so does a
+ * jl_cgimm).  Of nis,
  * nu and nis_mean a PE knows those of its own modes.
  * After the error of a channel the PEs may differ: the run is over. */
 int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch);

@@ -45,11 +45,12 @@ static int channels_hold(const jl_par_config *c, int need)
     return c->pe != 0 || c->to_host == NULL || c->to_host->max_len >= need;
 }
 
-int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
-                unsigned char *buf, int cap, int *status, jl_real *z)
+int jli_par_bind(jl_par *par, int M, int n, int m, int need,
+                 const jl_par_config *config, unsigned char *buf, int cap,
+                 int *status, jl_real *z)
 {
     jl_par_config copy = *config;
-    int need = JL_PAR_MSG(imm->M, imm->n, imm->m), active;
+    int active;
 
     if (copy.npe < 1 || copy.npe > JL_MAX_PES || copy.pe < 0
         || copy.pe >= copy.npe || copy.topology < JL_TOPO_FULL
@@ -57,7 +58,7 @@ int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
         || (copy.exchange != JL_EXCHANGE_GATHER
             && copy.exchange != JL_EXCHANGE_REDUCE))
         return JL_EDIM;
-    active = count_active(copy.owner, imm->M, copy.npe);
+    active = count_active(copy.owner, M, copy.npe);
     if (active == 0)
         return JL_EDIM;
     if (cap < 2 * need)
@@ -68,7 +69,9 @@ int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
         return JL_ETOOLONG;
     memset(par, 0, sizeof *par);
     par->config = copy;
-    par->imm = imm;
+    par->M = M;
+    par->n = n;
+    par->m = m;
     par->active = active;
     par->buf = buf;
     par->cap = cap;
@@ -104,27 +107,34 @@ static int pass_on(jl_par *par, int len, int last)
 /* Read a measurement, or say why it is refused. */
 static int accept_meas(jl_par *par, jl_meas *meas, int len)
 {
-    int m = par->imm->m;
-    jl_real most = par->imm->gate > 0 ? JL_REAL_MAX : JL_LARGE;
-    int status = jli_msg_meas_read(meas, par->z, m, JLI_IN(par), len);
+    int status = jli_msg_meas_read(meas, par->z, par->m, JLI_IN(par), len);
 
     if (status != JL_OK)
         return status;
     if (par->steps > 0 && meas->seq <= par->seq)
         return JL_EMSG;
     if (!jli_finite(meas->dt)
-        || (meas->z != NULL && !jl_vec_within(par->z, m, most)))
+        || (meas->z != NULL
+            && !jl_vec_within(par->z, par->m, par->kind->largest(par))))
         return JL_ENONFINITE;
     return meas->dt < 0 ? JL_ETIME : JL_OK;
 }
 
-static int answer(jl_par *par, jl_u32 seq, int status)
+static int answer(jl_par *par, jl_u32 seq, int status, jl_real *scratch)
 {
+    jl_estimate estimate;
     int len;
 
     if (par->config.pe != 0)
         return JL_OK;
-    len = jli_msg_estimate(JLI_OUT(par), par->imm, seq, status);
+    memset(&estimate, 0, sizeof estimate);
+    estimate.seq = seq;
+    estimate.status = status;
+    if (status == JL_OK) {
+        estimate.verdict = par->verdict;
+        par->kind->answer(par, &estimate, scratch);
+    }
+    len = jli_msg_estimate(JLI_OUT(par), &estimate, par->M, par->n);
     return jli_par_send(par, par->config.npe, JLI_OUT(par), len,
                         par->config.timeout_us, 0);
 }
@@ -140,7 +150,7 @@ static int serve_meas(jl_par *par, int len, jl_real *scratch)
     status = accept_meas(par, &meas, len);
     if (status != JL_OK) {
         par->refused++;
-        return answer(par, meas.seq, status);
+        return answer(par, meas.seq, status, scratch);
     }
     status = pass_on(par, len, par->active);
     if (status != JL_OK)
@@ -149,7 +159,7 @@ static int serve_meas(jl_par *par, int len, jl_real *scratch)
     par->steps++;
     if (par->failed != JL_OK)
         return status;
-    status = answer(par, meas.seq, status);
+    status = answer(par, meas.seq, status, scratch);
     jl_par_ahead(par, scratch);
     return status;
 }

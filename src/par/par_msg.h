@@ -21,6 +21,10 @@
  * measurement is outside the mode's gate: then, and if the mode is impossible,
  * (x, P) are predicted only.  The verdict is 0 if the status is not.  FAULT
  * names the PE (npe: the host) that cannot be gone on with.
+ *
+ * A constant-gain IMM has no P, and in MODES the axes' sum of nu^2 in the place
+ * of l, and x as it keeps it: axis by axis p, v T and, of order 3, a T^2 / 2.
+ * That all run the same kind of filter is for the fingerprint to say.
  */
 #ifndef JL_PAR_MSG_H
 #define JL_PAR_MSG_H
@@ -35,6 +39,8 @@
 #define jli_msg_estimate jli_msg_estimate_f32
 #define jli_msg_estimate_read jli_msg_estimate_read_f32
 #define jli_msg_plain jli_msg_plain_f32
+#define jli_put_upper jli_put_upper_f32
+#define jli_get_upper jli_get_upper_f32
 #define jli_msg_fault_read jli_msg_fault_read_f32
 #define jli_par_send jli_par_send_f32
 #define jli_par_recv jli_par_recv_f32
@@ -43,6 +49,7 @@
 #define jli_par_ready jli_par_ready_f32
 #define jli_par_order jli_par_order_f32
 #define jli_par_exchange jli_par_exchange_f32
+#define jli_par_bind jli_par_bind_f32
 #define jli_pool_own jli_pool_own_f32
 #define jli_pool_merge jli_pool_merge_f32
 #endif
@@ -68,10 +75,17 @@ int jli_msg_modes(unsigned char *buf, const jl_par *par, const jl_hop *hop);
 int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
                        const unsigned char *buf, int len);
 
-int jli_msg_estimate(unsigned char *buf, const jl_imm *imm, jl_u32 seq,
-                     int status);
+/* Without a covariance if estimate->P is NULL. */
+int jli_msg_estimate(unsigned char *buf, const jl_estimate *estimate, int M,
+                     int n);
 int jli_msg_estimate_read(jl_estimate *estimate, int M, int n,
                           const unsigned char *buf, int len);
+
+/* The lower half of a covariance is not sent: it mirrors the upper, or, of a
+ * factor, is zero.  Return what follows. */
+unsigned char *jli_put_upper(unsigned char *p, const jl_real *P, int n);
+const unsigned char *jli_get_upper(const unsigned char *p, jl_real *P,
+                                   int factored, int n);
 
 /* Whom a FAULT accuses, and of what: JL_OK, JL_EMSG or JL_ELENGTH. */
 int jli_msg_fault_read(int *culprit, int *status, int npe,

@@ -12,6 +12,45 @@
 #define JLI_CARRIES(hop, pe, npe) \
     (((pe) - (hop)->first + (npe)) % (npe) < (hop)->count)
 
+#define JLI_OWNS(par, j) ((par)->config.owner[j] == (par)->config.pe)
+
+/* --- par_imm.c, par_cg.c: what is distributed ----------------------------- */
+
+/* What the parallel filter must know of a kind of filter; j is a mode. */
+struct jl_par_kind {
+    /* The largest magnitude a measurement may have. */
+    jl_real (*largest)(const jl_par *par);
+
+    /* JL_OK, now the step; JL_STARTED; or a code: the step fails with it. */
+    int (*prepare)(jl_par *par, const jl_meas *meas);
+
+    /* Mix the own modes, and whatever needs no measurement, unless that is
+     * done; then the rest up to the exchange.  Both leave a status a mode. */
+    void (*ahead)(jl_par *par, jl_real *scratch);
+    void (*update)(jl_par *par, const jl_real *z, jl_real *scratch);
+
+    /* No mode has failed anywhere: weigh, and combine. */
+    int (*commit)(jl_par *par, const jl_real *z, jl_real *scratch);
+
+    /* A mode in MODES: its status and, besides par->l[j], its estimate of so
+     * many reals. */
+    unsigned (*word)(const jl_par *par, int j);
+    void (*read_word)(jl_par *par, int j, unsigned word);
+    int (*reals)(const jl_par *par, int j);
+    unsigned char *(*put)(unsigned char *p, const jl_par *par, int j);
+    const unsigned char *(*get)(const unsigned char *p, jl_par *par, int j);
+
+    /* loglik, x, P (or NULL), mu of *estimate: the filter's own, or scratch. */
+    void (*answer)(const jl_par *par, jl_estimate *estimate,
+                   jl_real *scratch);
+};
+
+/* jl_par_init for any kind; need is its longest message.  The caller sets the
+ * rest: the filter, its kind and its l. */
+int jli_par_bind(jl_par *par, int M, int n, int m, int need,
+                 const jl_par_config *config, unsigned char *buf, int cap,
+                 int *status, jl_real *z);
+
 /* --- par_fault.c: channels, and whose fault it is ------------------------ */
 
 /* A message to or from a PE, or the host (npe).  Return JL_OK or, for recv, the
@@ -39,8 +78,8 @@ int jli_par_ready(jl_par *par);
  * on what is received before it is received. */
 void jli_par_order(jl_par *par);
 
-/* l, x, P and the status of all modes, or pools, to all active PEs.  Returns
- * JL_OK, or the error of a channel. */
+/* l, the estimate and the status of all modes, or pools, to all active PEs.
+ * Returns JL_OK, or the error of a channel. */
 int jli_par_exchange(jl_par *par);
 
 /* --- par_pool.c: the all-reduce ------------------------------------------- */

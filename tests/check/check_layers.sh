@@ -14,7 +14,7 @@ chan      base
 model     base mat
 kf        base mat model
 imm       base mat model kf
-cgimm     base mat
+cgimm     base mat model
 mekf      base mat
 systolic  base mat mekf
 pf        base mat rng model
@@ -137,7 +137,7 @@ function check(line, from,    name, to, list, h) {
                 list = ""
         if (!index(list, " * "))
             complain("may not include <" name ">")
-    } else if (name !~ /^JL_(CONFIG|KF_SIZES)_FILE$/)
+    } else if (name !~ /^JL_(CONFIG|REAL|KF_SIZES)_FILE$/)
         complain("includes what only the preprocessor knows")
 }
 

@@ -10,7 +10,7 @@ complain() { echo "$*"; bad=1; }
 planned='Makefile README.md LICENSE include src port tests sim'
 topics='base mat rng model kf imm cgimm mekf systolic pf dropout chan wire link plan par'
 ports='README.md skel loop threads lcm mpi qemu uart'
-tests='README.md close.h unit golden conform program fault fuzz examples firmware bench check'
+tests='README.md close.h unit golden conform program fault fuzz examples count firmware bench check'
 
 # listed FOLDER NAME...: the folder holds nothing else.
 listed() {

@@ -11,6 +11,7 @@ sim       liblcm-bin                 lcm-gen
 sim       libjansson-dev             jansson.h
 sim       gnuplot-nox                gnuplot
 test      libcmocka-dev              cmocka.h
+test      g++                        g++
 test      nftables                   /usr/sbin/nft
 test      iproute2                   ip
 bench     g++                        g++

@@ -1,5 +1,5 @@
-/* Turns the reference cases of the IMM into C tables, so that the same test
- * runs on a PC and on a board:  gen_golden DIR > imm_cases.h
+/* Turns the reference cases of a kind of filter into C tables, so that the same
+ * test runs on a PC and on a board:  gen_golden DIR KIND > KIND_cases.h
  * DIR holds one folder a case: model.json, z.csv, expected.csv. */
 #include <dirent.h>
 #include <jansson.h>
@@ -63,14 +63,34 @@ static int put_csv(const char *name, const char *what, const char *path)
     return rows;
 }
 
-static void put_case(const char *dir, const char *name)
+/* What a case's struct holds behind its name and sizes, but for z and expected:
+ * by mode, and once. */
+static const struct kind {
+    const char *name;
+    const char *modes[9], *top[5];
+} kinds[] = {
+    { "imm", { "Phi", "Gamma", "Q", "H", "R", "w_bar", "x0", "P0" },
+      { "Pi", "mu0" } },
+    { "cgimm", { "x0", "w0", "winf", "kc" }, { "T", "R", "Pi", "mu0" } }
+};
+
+static const struct kind *kind_of(const char *name)
 {
-    static const char *const keys[] = { "Phi", "Gamma", "Q", "H", "R", "w_bar",
-                                        "x0", "P0" };
+    size_t i;
+
+    for (i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        if (strcmp(kinds[i].name, name) == 0)
+            return &kinds[i];
+    fail("no such kind", name);
+    return NULL;
+}
+
+static void put_case(const struct kind *kind, const char *dir, const char *name)
+{
     char path[4096];
     json_error_t error;
     json_t *model, *modes;
-    size_t k;
+    const char *const *key;
     int rows;
 
     snprintf(path, sizeof path, "%s/%s/model.json", dir, name);
@@ -78,27 +98,29 @@ static void put_case(const char *dir, const char *name)
     if (model == NULL)
         fail(error.text, path);
     modes = json_object_get(model, "modes");
-    for (k = 0; k < sizeof keys / sizeof *keys; k++)
-        put_array(name, keys[k], modes);
-    printf("static const double %s_Pi[] = {", name);
-    put_numbers(json_object_get(model, "Pi"));
-    printf("};\nstatic const double %s_mu0[] = {", name);
-    put_numbers(json_object_get(model, "mu0"));
-    printf("};\n");
+    for (key = kind->modes; *key != NULL; key++)
+        put_array(name, *key, modes);
+    for (key = kind->top; *key != NULL; key++) {
+        printf("static const double %s_%s[] = {", name, *key);
+        put_numbers(json_object_get(model, *key));
+        printf("};\n");
+    }
     snprintf(path, sizeof path, "%s/%s/z.csv", dir, name);
     rows = put_csv(name, "z", path);
     snprintf(path, sizeof path, "%s/%s/expected.csv", dir, name);
     if (put_csv(name, "expected", path) != rows)
         fail("not as many rows as z.csv", path);
-    printf("#define CASE_%s { \"%s\", %d, %d, %d, %d, %d, %s_Phi, %s_Gamma, "
-           "%s_Q, %s_H, %s_R, %s_w_bar, %s_x0, %s_P0, %s_Pi, %s_mu0, %s_z, "
-           "%s_expected }\n",
+    printf("#define CASE_%s { \"%s\", %d, %d, %d, %d, %d, ",
            name, name, (int)json_array_size(modes),
            (int)json_integer_value(json_object_get(model, "n")),
            (int)json_integer_value(json_object_get(model, "m")),
            (int)json_array_size(json_object_get(json_array_get(modes, 0), "Q")),
-           rows, name, name, name, name, name, name, name, name, name, name,
-           name, name);
+           rows);
+    for (key = kind->modes; *key != NULL; key++)
+        printf("%s_%s, ", name, *key);
+    for (key = kind->top; *key != NULL; key++)
+        printf("%s_%s, ", name, *key);
+    printf("%s_z, %s_expected }\n", name, name);
     json_decref(model);
 }
 
@@ -109,18 +131,21 @@ static int visible(const struct dirent *entry)
 
 int main(int argc, char **argv)
 {
+    const struct kind *kind;
     struct dirent **names;
     int i, n;
 
-    if (argc != 2)
-        fail("usage: gen_golden DIR", "arguments");
+    if (argc != 3)
+        fail("usage: gen_golden DIR KIND", "arguments");
+    kind = kind_of(argv[2]);
     n = scandir(argv[1], &names, visible, alphasort);
     if (n < 1)
         fail("no cases", argv[1]);
-    printf("/* made by gen_golden from tests/golden/imm */\n");
+    printf("/* made by gen_golden from tests/golden/%s */\n", kind->name);
     for (i = 0; i < n; i++)
-        put_case(argv[1], names[i]->d_name);
-    printf("static const struct imm_case imm_cases[] = {\n");
+        put_case(kind, argv[1], names[i]->d_name);
+    printf("static const struct %s_case %s_cases[] = {\n", kind->name,
+           kind->name);
     for (i = 0; i < n; i++)
         printf("    CASE_%s,\n", names[i]->d_name);
     printf("};\n");

@@ -207,14 +207,12 @@ static void test_host_interrupted(void **state)
     static struct live_input live;
     unsigned char answer[512];
     int pe, len;
-    jl_imm imm = { 0 };
+    jl_estimate estimate = { .seq = 1 };
     jl_real zero[64] = { 0 };
 
     (void)state;
-    imm.n = model.n;
-    imm.M = model.M;
-    imm.xhat = imm.Phat = imm.mu = zero;
-    len = jli_msg_estimate(answer, &imm, 1, JL_OK);
+    estimate.x = estimate.P = estimate.mu = zero;
+    len = jli_msg_estimate(answer, &estimate, model.M, model.n);
     interrupt_catch();
     raises = 1;
     say_ready(0);
