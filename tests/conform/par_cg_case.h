@@ -94,15 +94,15 @@ static inline void par_cg_meas(jl_meas *meas, jl_real *z, int k, int axes)
         z[i] = (jl_real)(450 - 200 * i) * (jl_real)k
             + (jl_real)(r >> 16) / 200 - 160
             + (k > 36 ? 40 * (jl_real)((k - 36) * (k - 36)) : 0);
+        if (k == 18 && i == axes - 1)
+            z[i] = -JL_REAL_MAX;
+        if (k >= 50 && k < 54)
+            z[i] = JL_LARGE;
     }
-    if (k == 18)
-        z[axes - 1] = -JL_REAL_MAX;
     if (k == 20)
         z[0] = -jl_log(0);
     if (k == 25)
         z[0] += 100000;
-    for (i = 0; i < axes && k >= 50 && k < 54; i++)
-        z[i] = JL_LARGE;
     meas->seq = (jl_u32)k + 1;
     meas->first = k == 0;
     meas->dt = 1;
