@@ -7,12 +7,14 @@
 #include <stdlib.h>
 
 #include "jumplink.h"
+#include "par_cg_case.h"
 
 #define PAR_M 9                         /* modes, usually */
 #define PAR_MOST 16                     /* ... and at most */
 #define PAR_N 4
 #define PAR_Z 2
 #define PAR_STEPS 60
+#define PAR_X (3 * PAR_CG_AXES)         /* states, at most */
 
 /* What is run, and over which PEs. */
 struct par_shape {
@@ -26,13 +28,13 @@ struct par_shape {
     int gate;                   /* a gate, and bursts of outliers           */
     int nonlinear;              /* two of three modes are                   */
     int sizes;                  /* some modes lack components               */
+    int axes;                   /* of a constant-gain IMM; 0: an IMM        */
+    const unsigned char *owner; /* NULL: modes are dealt out in turn        */
 };
 
 static const jl_kf_form *const par_forms[] = { &jl_kf_joseph, &jl_kf_standard,
                                                &jl_kf_sqrt };
 #define PAR_FORMS 3
-
-#define PAR_ASLEEP_US 1000000000L
 
 /* Every PE builds its own. */
 struct par_bank {
@@ -47,13 +49,14 @@ struct par_bank {
     jl_imm imm;
     jl_chan *silent;            /* nothing ever comes here                  */
     int hangs_at;               /* or -1                                    */
+    struct par_cg_bank cg;
 };
 
 /* What a run gives, step by step. */
 struct par_trace {
     int status[PAR_STEPS];
     int verdict[PAR_STEPS];
-    jl_real x[PAR_STEPS][PAR_N];
+    jl_real x[PAR_STEPS][PAR_X];
     jl_real P[PAR_STEPS][PAR_N * PAR_N];
     jl_real mu[PAR_STEPS][PAR_MOST];
     jl_real loglik[PAR_STEPS];
@@ -273,19 +276,38 @@ static inline void par_spoil(jl_real *z, int k)
 
 static inline void par_note(struct par_trace *trace, int k, int status,
                             int verdict, const jl_real *x, const jl_real *P,
-                            const jl_real *mu, jl_real loglik, int M)
+                            const jl_real *mu, jl_real loglik, int M, int n)
 {
     trace->status[k] = status;
     if (status != JL_OK)
         return;
     trace->verdict[k] = verdict;
-    memcpy(trace->x[k], x, sizeof trace->x[k]);
-    memcpy(trace->P[k], P, sizeof trace->P[k]);
+    memcpy(trace->x[k], x, (size_t)n * sizeof *x);
+    if (P != NULL)
+        memcpy(trace->P[k], P, sizeof trace->P[k]);
     memcpy(trace->mu[k], mu, (size_t)M * sizeof *mu);
     trace->loglik[k] = loglik;
 }
 
-/* The reference: jl_imm_step, on one processor. */
+static inline void par_serial_cg(struct par_trace *trace,
+                                 const struct par_shape *shape)
+{
+    struct par_cg_bank bank;
+    jl_real z[PAR_CG_AXES], x[PAR_X];
+    jl_meas meas;
+    int k, status, verdict;
+
+    par_cg_init(&bank, shape->M, shape->axes);
+    for (k = 0; k < PAR_STEPS; k++) {
+        par_cg_meas(&meas, z, k, shape->axes);
+        status = par_cg_step(&bank, &meas, &verdict);
+        jl_cgimm_estimate(&bank.cg, x);
+        par_note(trace, k, status, verdict, x, NULL, bank.cg.mu,
+                 bank.cg.loglik, shape->M, shape->axes * bank.cg.order);
+    }
+}
+
+/* The reference: jl_imm_step, or jl_cgimm_step, on one processor. */
 static inline void par_serial(struct par_trace *trace,
                               const struct par_shape *shape)
 {
@@ -295,6 +317,10 @@ static inline void par_serial(struct par_trace *trace,
     int k, status;
 
     memset(trace, 0, sizeof *trace);
+    if (shape->axes > 0) {
+        par_serial_cg(trace, shape);
+        return;
+    }
     par_bank_init(&bank, shape->M, shape->sticky, shape->form);
     if (shape->nonlinear)
         par_bank_bend(&bank);
@@ -311,8 +337,41 @@ static inline void par_serial(struct par_trace *trace,
         if (status == JL_OK)
             status = jl_imm_step(&bank.imm, meas.z, bank.scratch);
         par_note(trace, k, status, bank.imm.verdict, bank.imm.xhat,
-                 bank.imm.Phat, bank.imm.mu, bank.imm.loglik, shape->M);
+                 bank.imm.Phat, bank.imm.mu, bank.imm.loglik, shape->M,
+                 PAR_N);
     }
+}
+
+/* Bind a PE's part to the shape's filter and serve. */
+static inline int par_serve(jl_par *par, const struct par_shape *shape,
+                            struct par_bank *bank, jl_par_config *config)
+{
+    unsigned char buf[JL_PAR_BUF(PAR_MOST, PAR_N, PAR_Z)];
+    int mode_status[PAR_MOST], status;
+    jl_real z[PAR_CG_AXES];
+
+    if (shape->axes > 0) {
+        par_cg_init(&bank->cg, shape->M, shape->axes);
+        bank->cg.silent = bank->silent;
+        bank->cg.hangs_at = bank->hangs_at;
+        config->prepare_cg = par_cg_prepare;
+        config->context = &bank->cg;
+        status = jl_par_init_cg(par, &bank->cg.cg, config, buf, sizeof buf,
+                                mode_status, z);
+        return status == JL_OK ? jl_par_serve(par, bank->cg.scratch) : status;
+    }
+    par_bank_init(bank, shape->M, shape->sticky, shape->form);
+    if (shape->sizes)
+        par_bank_sizes(bank);
+    if (shape->gate)
+        par_bank_gate(bank, shape->sticky);
+    if (shape->nonlinear)
+        par_bank_bend(bank);
+    config->prepare = par_prepare;
+    config->context = bank;
+    status = jl_par_init(par, &bank->imm, config, buf, sizeof buf,
+                         mode_status, z);
+    return status == JL_OK ? jl_par_serve(par, bank->scratch) : status;
 }
 
 /* A PE's part; the channels are [npe + 1], the host is the node npe; of
@@ -322,42 +381,29 @@ static inline int par_pe(int pe, const struct par_shape *shape, jl_chan **to,
                          jl_chan **from, int *blamed)
 {
     struct par_bank *bank = malloc(sizeof *bank);
-    unsigned char owner[PAR_MOST], buf[JL_PAR_BUF(PAR_MOST, PAR_N, PAR_Z)];
-    int mode_status[PAR_MOST], status;
+    unsigned char dealt[PAR_MOST];
     jl_par_config config = { 0 };
-    jl_real z[PAR_Z];
+    int status;
     jl_par par;
 
-    par_bank_init(bank, shape->M, shape->sticky, shape->form);
-    if (shape->sizes)
-        par_bank_sizes(bank);
-    if (shape->gate)
-        par_bank_gate(bank, shape->sticky);
-    if (shape->nonlinear)
-        par_bank_bend(bank);
     bank->silent = from[pe];
     bank->hangs_at = shape->hangs == pe ? shape->hangs_at : -1;
     if (bank->hangs_at == 0)
         (void)jl_chan_recv(bank->silent, NULL, 0, PAR_ASLEEP_US);
-    jl_par_deal(owner, shape->M, shape->npe);
+    jl_par_deal(dealt, shape->M, shape->npe);
     config.pe = pe;
     config.npe = shape->npe;
-    config.owner = owner;
+    config.owner = shape->owner != NULL ? shape->owner : dealt;
     config.topology = shape->topology;
     config.exchange = shape->exchange;
     config.to = to;
     config.from = from;
     config.to_host = to[shape->npe];
     config.from_host = from[shape->npe];
-    config.prepare = par_prepare;
-    config.context = bank;
     config.fingerprint = 7;
     config.timeout_us = 5000000;
     config.start_us = 5000000;
-    status = jl_par_init(&par, &bank->imm, &config, buf, sizeof buf,
-                         mode_status, z);
-    if (status == JL_OK)
-        status = jl_par_serve(&par, bank->scratch);
+    status = par_serve(&par, shape, bank, &config);
     if (blamed != NULL)
         *blamed = par.failed_pe;
     free(bank);
@@ -371,30 +417,40 @@ static inline int par_host(struct par_trace *trace,
                            jl_chan *from, int *blamed)
 {
     unsigned char buf[JL_PAR_MSG(PAR_MOST, PAR_N, PAR_Z)];
-    jl_real x[PAR_N], P[PAR_N * PAR_N], mu[PAR_MOST], z[PAR_Z];
+    jl_real x[PAR_X], P[PAR_N * PAR_N], mu[PAR_MOST], z[PAR_CG_AXES];
+    int n = PAR_N, m = PAR_Z, axes = shape->axes, k, status;
     jl_estimate estimate = { 0 };
     jl_meas meas;
-    int k, status;
 
     memset(trace, 0, sizeof *trace);
+    if (axes > 0) {
+        m = axes;
+        n = axes * 2;
+        for (k = 0; k < shape->M; k++)
+            if (par_cg_order(k, shape->M, axes) == 3)
+                n = axes * 3;
+    }
     estimate.x = x;
-    estimate.P = P;
+    estimate.P = axes > 0 ? NULL : P;
     estimate.mu = mu;
     status = jl_host_ready(from, 7, &estimate.failed_pe, buf, sizeof buf,
                            60000000);
     for (k = 0; k < PAR_STEPS && status == JL_OK; k++) {
-        par_meas(&meas, z, k);
+        if (axes > 0)
+            par_cg_meas(&meas, z, k, axes);
+        else
+            par_meas(&meas, z, k);
         if (shape->gate)
             par_spoil(z, k);
-        status = jl_host_send(to, &meas, PAR_Z, buf, sizeof buf, 5000000);
+        status = jl_host_send(to, &meas, m, buf, sizeof buf, 5000000);
         if (status == JL_OK)
-            status = jl_host_recv(from, &estimate, shape->M, PAR_N, buf,
+            status = jl_host_recv(from, &estimate, shape->M, n, buf,
                                   sizeof buf, 60000000);
         if (status == JL_OK && estimate.seq != meas.seq)
             status = JL_EMSG;
         if (status == JL_OK)
-            par_note(trace, k, estimate.status, estimate.verdict, x, P, mu,
-                     estimate.loglik, shape->M);
+            par_note(trace, k, estimate.status, estimate.verdict, x,
+                     estimate.P, mu, estimate.loglik, shape->M, n);
     }
     if (blamed != NULL)
         *blamed = estimate.failed_pe;

@@ -2,6 +2,7 @@
 #include "close.h"
 
 #include "par/par_parts.h"
+#include "par_cg_case.h"
 
 /* --- deadlines ----------------------------------------------------------- */
 
@@ -54,6 +55,56 @@ static void test_par_deadlines_grow_and_stay_numbers(void **state)
     assert_true(before > LONG_MAX / 8 * 7);
 }
 
+/* --- octets -------------------------------------------------------------- */
+
+/* What jumplink/par.h says of a mode's message; and none is longer than there. */
+static void test_par_cg_messages_are_as_short_as_said(void **state)
+{
+    static struct par_cg_bank bank;
+    static const unsigned char owner[2] = { 0, 1 };
+    unsigned char buf[JL_PAR_CG_BUF(2, 3)], msg[JL_PAR_CG_MSG(2, 3)];
+    jl_real mu[2] = { 0 }, x[9] = { 0 }, z[3];
+    jl_estimate estimate = { 0 };
+    jl_par_config config = { 0 };
+    jl_chan chan = { 0 }, *chans[2];
+    jl_hop hop = { 0 };
+    int axes, pe, order, status[2];
+    jl_par par;
+
+    (void)state;
+    chan.max_len = JL_PAR_CG_MSG(2, 3);
+    chans[0] = chans[1] = &chan;
+    config.npe = 2;
+    config.owner = owner;
+    config.to = config.from = chans;
+    estimate.x = x;
+    estimate.mu = mu;
+    hop.count = 1;
+    for (axes = 1; axes <= 3; axes++)
+        for (pe = 0; pe < 2; pe++) {
+            par_cg_init(&bank, 2, axes);
+            config.pe = pe;
+            hop.first = hop.from = (unsigned char)pe;
+            order = par_cg_order(pe, 2, axes);
+            assert_int_equal(jl_par_init_cg(&par, &bank.cg, &config, buf,
+                                            sizeof buf, status, z), JL_OK);
+            status[pe] = 0;
+            assert_int_equal(jli_msg_modes(msg, &par, &hop),
+                             8 + 2 + JL_REAL_OCTETS * (1 + axes * order));
+            assert_int_equal(jli_msg_modes_read(&par, &hop, msg,
+                                                8 + 2 + JL_REAL_OCTETS
+                                                * (1 + axes * order)), JL_OK);
+            assert_int_equal(jli_msg_modes_read(&par, &hop, msg,
+                                                8 + 2 + JL_REAL_OCTETS
+                                                * (2 + axes * order)),
+                             JL_ELENGTH);
+            assert_int_equal(jli_msg_estimate(msg, &estimate, 2,
+                                              axes * bank.cg.order),
+                             8 + JL_REAL_OCTETS
+                             * (1 + axes * bank.cg.order + 2));
+        }
+}
+
 /* --- pools --------------------------------------------------------------- */
 
 #define MODES 3
@@ -101,6 +152,7 @@ int main(void)
 {
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_deadlines_grow_and_stay_numbers),
+        cmocka_unit_test(test_par_cg_messages_are_as_short_as_said),
         cmocka_unit_test(test_pool_heeds_only_modes_that_are_possible),
     };
 

@@ -112,11 +112,29 @@ static void test_par_gate_gives_serial_bits_over_lcm(void **state)
     compare_all(1);
 }
 
+static void test_par_cg_gives_serial_bits_over_lcm(void **state)
+{
+    static const int modes[] = { 2, PAR_CG_M, 1, 3 };
+    struct par_shape s = { .hangs_at = -1 };
+
+    (void)state;
+    if (!is_private)
+        skip();
+    for (s.topology = JL_TOPO_FULL; s.topology <= JL_TOPO_CHAIN;
+         s.topology++)
+        for (s.npe = 1; s.npe <= 8; s.npe++) {
+            s.M = modes[(s.npe + s.topology) % 4];
+            s.axes = 1 + (s.npe + 2 * s.topology) % PAR_CG_AXES;
+            compare(&s);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_over_lcm_and_topologies),
         cmocka_unit_test(test_par_gate_gives_serial_bits_over_lcm),
+        cmocka_unit_test(test_par_cg_gives_serial_bits_over_lcm),
     };
 
     is_private = private_net_enter() == 0;

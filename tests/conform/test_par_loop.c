@@ -334,6 +334,203 @@ static void test_par_reduce_refuses_a_chain_that_is_not_sticky(void **state)
         assert_int_equal(run.trace.status[k], JL_ECHAIN);
 }
 
+/* --- the constant-gain IMM ------------------------------------------------ */
+
+/* The reference covers lost measurements, steps that fail, two starts. */
+static void check_cg(const struct par_shape *shape)
+{
+    static struct par_trace serial;
+    int k, failures = 0;
+
+    par_serial(&serial, shape);
+    for (k = 0; k < PAR_STEPS; k++)
+        failures += serial.status[k] != JL_OK;
+    assert_int_equal(failures, 3);
+    assert_int_equal(serial.status[18], JL_ENONFINITE);
+    assert_int_equal(serial.status[20], JL_ENONFINITE);
+    assert_int_equal(serial.status[43], JL_ERANGE);
+    assert_int_equal(serial.verdict[5], JL_MISSING);
+    assert_int_equal(serial.verdict[34], JL_MISSING);
+    assert_int_equal(serial.verdict[25], JL_ACCEPTED);
+}
+
+static void test_par_cg_gives_serial_bits(void **state)
+{
+    static const int modes[] = { 1, 2, 3, PAR_CG_M };
+    static struct run run = { .shape = { .hangs_at = -1 } };
+    struct par_shape *s = &run.shape;
+    int k, slots;
+
+    (void)state;
+    for (k = 0; k < 4; k++)
+        for (s->axes = 1; s->axes <= PAR_CG_AXES; s->axes++) {
+            s->M = modes[k];
+            check_cg(s);
+            for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+                 s->topology++)
+                for (s->npe = 1; s->npe <= 8; s->npe++)
+                    for (slots = 0; slots <= 2; slots++)
+                        compare(&run, slots);
+        }
+}
+
+static void test_par_cg_heeds_the_owner_table(void **state)
+{
+    static const unsigned char owners[][PAR_CG_M] = {
+        { 1, 0, 1, 1, 1, 1, 1, 1 }, { 2, 0, 0, 1, 1, 1, 0, 2 },
+        { 2, 1, 0, 0, 0, 0, 0, 0 }
+    };
+    static const int least[] = { 2, 4, 3 };     /* modes, to need the PEs */
+    static struct run run = { .shape = { .hangs_at = -1 } };
+    struct par_shape *s = &run.shape;
+    int k;
+
+    (void)state;
+    s->npe = 4;
+    for (k = 0; k < 3; k++)
+        for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+             s->topology++)
+            for (s->M = least[k]; s->M <= PAR_CG_M; s->M++) {
+                s->owner = owners[k];
+                s->axes = 1 + s->M % PAR_CG_AXES;
+                compare(&run, s->M % 3);
+            }
+}
+
+static void test_par_cg_blames_the_dead(void **state)
+{
+    static struct run run;
+    struct par_shape *s = &run.shape;
+    int pe;
+
+    (void)state;
+    s->M = 4;
+    s->npe = 4;
+    s->axes = 1;
+    s->hangs_at = 7;
+    for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+         s->topology++)
+        for (s->hangs = 0; s->hangs < s->npe; s->hangs++) {
+            start(&run, s->hangs % 3);
+            for (pe = 0; pe <= s->npe; pe++)
+                if (pe != s->hangs) {
+                    assert_true(run.status[pe] != JL_OK);
+                    if (pe < s->npe || s->hangs > 0)
+                        assert_int_equal(run.blamed[pe], s->hangs);
+                }
+        }
+}
+
+#define CG_PES 3
+#define CG_ROWS 20
+
+/* Every PE steps by itself, with measurements that it has already; one has got
+ * a bad one. */
+struct alone {
+    jl_loop *loop;
+    int M, bad_pe;
+    int status[CG_PES][CG_ROWS];
+    struct par_cg_bank bank[CG_PES];
+};
+
+#define BAD_ROW(k) ((k) % 6 == 3)
+
+static void step_alone(struct alone *a, int pe, jl_par *par)
+{
+    struct par_cg_bank *bank = &a->bank[pe], before;
+    jl_real z[1];
+    jl_meas meas;
+    int k, bad;
+
+    for (k = 1; k < CG_ROWS; k++) {
+        before = *bank;
+        par_cg_meas(&meas, z, k, 1);
+        bad = BAD_ROW(k) || meas.z == NULL;
+        meas.z = z;
+        if (bad && pe == a->bad_pe)
+            z[0] = k % 2 ? JL_REAL_MAX : jl_log(0);
+        a->status[pe][k] = jl_par_step(par, &meas, bank->scratch);
+        if (a->status[pe][k] != JL_OK) {
+            assert_same_bits(bank->cg.mu, before.mem + (bank->cg.mu - bank->mem),
+                             (size_t)a->M * sizeof *z);
+            assert_same_bits(bank->cg.x, before.mem + (bank->cg.x - bank->mem),
+                             (size_t)(3 * a->M) * sizeof *z);
+            assert_same_bits(bank->cg.w, before.mem + (bank->cg.w - bank->mem),
+                             (size_t)(3 * a->M) * sizeof *z);
+        }
+        if (k % 2)
+            jl_par_ahead(par, bank->scratch);
+    }
+}
+
+static void alone_body(int pe, void *context)
+{
+    struct alone *a = context;
+    jl_chan *to[CG_PES] = { NULL }, *from[CG_PES] = { NULL };
+    unsigned char owner[PAR_CG_M], buf[JL_PAR_CG_BUF(PAR_CG_M, 1)];
+    int status[PAR_CG_M], i;
+    jl_par_config config = { 0 };
+    jl_real z[1];
+    jl_par par;
+
+    for (i = 0; i < CG_PES; i++)
+        if (i != pe) {
+            to[i] = jl_loop_tx(a->loop, pe, i);
+            from[i] = jl_loop_rx(a->loop, i, pe);
+        }
+    jl_par_deal(owner, a->M, CG_PES);
+    config.pe = pe;
+    config.npe = CG_PES;
+    config.owner = owner;
+    config.to = to;
+    config.from = from;
+    config.timeout_us = 1000000;
+    par_cg_init(&a->bank[pe], a->M, 1);
+    assert_int_equal(jl_par_init_cg(&par, &a->bank[pe].cg, &config, buf,
+                                    sizeof buf, status, z), JL_OK);
+    step_alone(a, pe, &par);
+}
+
+/* All PEs tell the same, and go on as if the step had not been. */
+static void test_par_cg_fails_for_all_or_none(void **state)
+{
+    static struct alone a;
+    static struct par_cg_bank serial;
+    jl_real z[1];
+    jl_meas meas;
+    int k, pe;
+
+    (void)state;
+    for (a.M = CG_PES; a.M <= PAR_CG_M; a.M++)
+        for (a.bad_pe = 0; a.bad_pe < CG_PES; a.bad_pe++) {
+            a.loop = jl_loop_new(CG_PES, JL_PAR_CG_MSG(PAR_CG_M, 1), 1);
+            assert_int_equal(jl_loop_run(a.loop, alone_body, &a), JL_OK);
+            jl_loop_free(a.loop);
+            par_cg_init(&serial, a.M, 1);
+            for (k = 1; k < CG_ROWS; k++) {
+                par_cg_meas(&meas, z, k, 1);
+                if (BAD_ROW(k) || meas.z == NULL || k == 18)
+                    meas.z = NULL;
+                else
+                    assert_int_equal(jl_cgimm_step(&serial.cg, z), JL_OK);
+                for (pe = 0; pe < CG_PES; pe++)
+                    assert_int_equal(a.status[pe][k],
+                                     meas.z == NULL ? JL_ENONFINITE : JL_OK);
+            }
+            for (pe = 0; pe < CG_PES; pe++) {
+                const jl_cgimm *cg = &a.bank[pe].cg;
+
+                assert_same_bits(cg->x, serial.cg.x,
+                                 (size_t)(3 * a.M) * sizeof *z);
+                assert_same_bits(cg->mu, serial.cg.mu,
+                                 (size_t)a.M * sizeof *z);
+                assert_same_bits(cg->w, serial.cg.w,
+                                 (size_t)(3 * a.M) * sizeof *z);
+                assert_same_bits(cg->xhat, serial.cg.xhat, 3 * sizeof *z);
+            }
+        }
+}
+
 /* --- death ---------------------------------------------------------------- */
 
 /* Whoever hangs, at the start or in a step: all others blame that PE, however
@@ -615,6 +812,44 @@ static void test_par_init_refuses_what_does_not_fit(void **state)
     assert_same_bits(&par, &before, sizeof par);
 }
 
+static void test_par_cg_init_refuses_what_does_not_fit(void **state)
+{
+    static struct par_cg_bank bank;
+    unsigned char owner[2] = { 0, 1 }, buf[JL_PAR_CG_BUF(2, 3)];
+    int mode_status[2];
+    jl_real z[3];
+    jl_chan small = { 0 }, *chans[2];
+    jl_par_config config = { 0 };
+    jl_par par, before;
+
+    (void)state;
+    par_cg_init(&bank, 2, 3);
+    small.max_len = JL_PAR_CG_MSG(2, 3) - 1;
+    chans[0] = chans[1] = &small;
+    memset(&par, 0x5a, sizeof par);
+    before = par;
+    config.npe = 2;
+    config.owner = owner;
+    config.to = config.from = chans;
+    config.exchange = JL_EXCHANGE_REDUCE;
+    assert_int_equal(jl_par_init_cg(&par, &bank.cg, &config, buf, sizeof buf,
+                                    mode_status, z), JL_ECHAIN);
+    config.exchange = JL_EXCHANGE_GATHER;
+    assert_int_equal(jl_par_init_cg(&par, &bank.cg, &config, buf, sizeof buf,
+                                    mode_status, z), JL_ETOOLONG);
+    small.max_len++;
+    assert_int_equal(jl_par_init_cg(&par, &bank.cg, &config, buf,
+                                    sizeof buf - 1, mode_status, z),
+                     JL_ENOMEM);
+    owner[1] = 2;
+    assert_int_equal(jl_par_init_cg(&par, &bank.cg, &config, buf, sizeof buf,
+                                    mode_status, z), JL_EDIM);
+    assert_same_bits(&par, &before, sizeof par);
+    owner[1] = 1;
+    assert_int_equal(jl_par_init_cg(&par, &bank.cg, &config, buf, sizeof buf,
+                                    mode_status, z), JL_OK);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -629,10 +864,15 @@ int main(void)
         cmocka_unit_test(test_par_reduce_equals_serial_up_to_rounding),
         cmocka_unit_test(test_par_sizes_reduce_equals_serial_up_to_rounding),
         cmocka_unit_test(test_par_reduce_refuses_a_chain_that_is_not_sticky),
+        cmocka_unit_test(test_par_cg_gives_serial_bits),
+        cmocka_unit_test(test_par_cg_heeds_the_owner_table),
+        cmocka_unit_test(test_par_cg_blames_the_dead),
+        cmocka_unit_test(test_par_cg_fails_for_all_or_none),
         cmocka_unit_test(test_par_blames_the_dead_and_not_the_relay),
         cmocka_unit_test(test_par_refuses_bad_measurements_with_a_code),
         cmocka_unit_test(test_par_believes_no_odd_pe),
         cmocka_unit_test(test_par_init_refuses_what_does_not_fit),
+        cmocka_unit_test(test_par_cg_init_refuses_what_does_not_fit),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

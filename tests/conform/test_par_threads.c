@@ -88,12 +88,31 @@ static void test_par_gives_serial_bits_with_functions(void **state)
     }
 }
 
+static void test_par_cg_gives_serial_bits_on_threads(void **state)
+{
+    static const int modes[] = { 1, 2, 3, PAR_CG_M };
+    static struct run run = { .shape = { .hangs_at = -1 } };
+    struct par_shape *s = &run.shape;
+    int k;
+
+    (void)state;
+    for (k = 0; k < 4; k++)
+        for (s->axes = 1; s->axes <= PAR_CG_AXES; s->axes++)
+            for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
+                 s->topology++)
+                for (s->npe = 1; s->npe <= 8; s->npe++) {
+                    s->M = modes[k];
+                    compare(&run, (s->npe + s->axes) % 3);
+                }
+}
+
 int main(void)
 {
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_gives_serial_bits_on_threads),
         cmocka_unit_test(test_par_gate_gives_serial_bits_on_threads),
         cmocka_unit_test(test_par_gives_serial_bits_with_functions),
+        cmocka_unit_test(test_par_cg_gives_serial_bits_on_threads),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
