@@ -19,9 +19,9 @@
  * and divisions, 27 additions, an exponential (tests/count), where the paper
  * has 76 and 46, and an IMM of matrices 10 times as many.
  *
- * What it is worth (paper's scenario): positions as good as the IMM's; in the
- * quiet phase after a manoeuvre velocities are 1.18, accelerations 1.36 times
- * as far off.  Whether a pair of modes is fit for it: jl_cg_coupling.
+ * What it is worth (paper's scenario, `jumplink sim --scenario manoeuvre1d`):
+ * positions as good as the IMM's; in the quiet phase after a manoeuvre
+ * velocities are 1.17, accelerations 1.34 times as far off.  Whether a pair of modes is fit for it: jl_cg_coupling.
  */
 #ifndef JL_CGIMM_H
 #define JL_CGIMM_H
