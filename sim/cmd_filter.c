@@ -9,8 +9,8 @@
 static const char help[] =
     "usage: jumplink filter MODEL.json DATA.csv [OPTIONS]\n"
     "Runs a filter over the measurements in a file and writes its\n"
-    "estimates as CSV: time, x0.., P00,P01.. (upper triangle), mu0..,\n"
-    "loglik.\n\n"
+    "estimates as CSV: time, x0.., P00,P01.. (upper triangle; not of kind\n"
+    "cgimm), mu0.., loglik.\n\n"
     MODEL_HELP
     "  -o, --out FILE    where to (default: standard output)\n"
     "  --diagnostics     more columns: of each mode j its innovation\n"

@@ -89,6 +89,7 @@ int cmd_pe(int argc, char **argv)
         || options.port != PORT_NONE)
         return misuse("pe", "--hold, --z, --time, --out and --port are not "
                       "for a PE");
+    options.port = PORT_BY_HAND;
     if (model_read(&model, path) != 0)
         return 2;
     status = run_pick_mode(&model, &options);

@@ -7,6 +7,7 @@
 #include "command.h"
 #include "complain.h"
 #include "flight_report.h"
+#include "manoeuvre.h"
 #include "out_file.h"
 #include "progress.h"
 #include "run.h"
@@ -17,6 +18,7 @@
 static const char help[] =
     "usage: jumplink sim [OPTIONS]\n"
     "       jumplink sim --input lcm --model FILE --lcm-url URL [OPTIONS]\n"
+    "       jumplink sim --scenario manoeuvre1d [--runs N] [--seed S] [-o DIR]\n"
     "Filters a recorded flight on PEs that are processes talking over\n"
     "LCM, once with every position taken as fresh and once with held\n"
     "positions recognised, for each model; compares with the serial\n"
@@ -45,6 +47,11 @@ static const char help[] =
     "                    ones are predicted through, and counted\n"
     "  --idle S          ... until none came for so long (default 5); the\n"
     "                    longest wait for the first is --start (default 60)\n"
+    "  --scenario manoeuvre1d  no flight, but simulated runs of a target that\n"
+    "                    accelerates at 10 s and stops doing so at 25 s: IMM,\n"
+    "                    constant-gain IMM and an adaptive alpha-beta filter\n"
+    "  --runs N          ... so many (default 2000)\n"
+    "  --seed S          ... with noise that S determines (default 1)\n"
     HELP_HELP;
 
 /* One model, one way with held positions: serial for comparison, then
@@ -207,6 +214,23 @@ static int recorded(const char *data, const char *const *models, int count,
     return sim(data, models, count == 0 ? 2 : count, options);
 }
 
+/* Simulated runs; `other` is an option they have no use for, or NULL. */
+static int simulated(const char *scenario, const char *other, long runs,
+                     uint64_t seed, const char *folder)
+{
+    struct manoeuvre m;
+
+    if (strcmp(scenario, "manoeuvre1d") != 0)
+        return misuse("sim", "--scenario %s: only manoeuvre1d is known",
+                      scenario);
+    if (other != NULL)
+        return misuse("sim", "%s is not for --scenario, which takes --runs, "
+                      "--seed and --out", other);
+    if (out_folder(folder) != 0 || manoeuvre_run(&m, runs, seed) != 0)
+        return 1;
+    return manoeuvre_report(&m, folder);
+}
+
 int cmd_sim(int argc, char **argv)
 {
     static const struct option known[] = {
@@ -214,6 +238,9 @@ int cmd_sim(int argc, char **argv)
         { "model", required_argument, NULL, 'm' },
         { "input", required_argument, NULL, 'i' },
         { "idle", required_argument, NULL, 'w' },
+        { "scenario", required_argument, NULL, 's' },
+        { "runs", required_argument, NULL, 'r' },
+        { "seed", required_argument, NULL, 'n' },
         COMMON_OPTIONS, { 0 }
     };
     const char *data = NULL;
@@ -221,7 +248,8 @@ int cmd_sim(int argc, char **argv)
                                        "sim/data/eight_modes.json" };
     struct options options;
     int c, count = 0, off_network = 0, status = 0;
-    long idle_us = 0;
+    const char *scenario = NULL, *other = NULL;
+    long idle_us = 0, runs = 0, seed = -1;
 
     options_init(&options, "sim");
     options.start_us = 0;               /* the default is not known yet */
@@ -233,7 +261,16 @@ int cmd_sim(int argc, char **argv)
             fputs(help, stdout);
             return 0;
         }
-        if (c == 'd')
+        if (c > 127 || strchr("srno:?", c) == NULL)
+            other = argv[optind - 1] == optarg ? argv[optind - 2]
+                                               : argv[optind - 1];
+        if (c == 's')
+            scenario = optarg;
+        else if (c == 'r')
+            status = option_long(&runs, "sim", "runs", optarg, 2, 100000000);
+        else if (c == 'n')
+            status = option_long(&seed, "sim", "seed", optarg, 0, 2147483647);
+        else if (c == 'd')
             data = optarg;
         else if (c == 'i' && strcmp(optarg, "lcm") == 0)
             off_network = 1;
@@ -255,6 +292,11 @@ int cmd_sim(int argc, char **argv)
         return status;
     if (optind < argc)
         return misuse("sim", "unexpected '%s'", argv[optind]);
+    if (scenario != NULL)
+        return simulated(scenario, other, runs > 0 ? runs : 2000,
+                         seed >= 0 ? (uint64_t)seed : 1, options.out);
+    if (runs > 0 || seed >= 0)
+        return misuse("sim", "--runs and --seed go with --scenario");
     if (options.start_us == 0)
         options.start_us = off_network ? 60000000 : 10000000;
     return off_network

@@ -30,7 +30,7 @@ static int make_room(struct estimates *e, long rows)
     double *us;
 
     if (stretch(&e->x, had * n, rows * n) != 0
-        || stretch(&e->P, had * n * n, rows * n * n) != 0
+        || (e->has_P && stretch(&e->P, had * n * n, rows * n * n) != 0)
         || stretch(&e->mu, had * M, rows * M) != 0
         || stretch(&e->loglik, had, rows) != 0)
         return -1;
@@ -59,6 +59,7 @@ int estimates_open(struct estimates *e, const struct data_file *data,
     memset(e, 0, sizeof *e);
     e->n = model->n;
     e->M = model->M;
+    e->has_P = model->gains == NULL;
     if (estimates_grow(e, data->rows) == 0)
         return 0;
     estimates_close(e);
@@ -82,7 +83,8 @@ void estimates_note(struct estimates *e, long row, const jl_real *x,
     int n = e->n, M = e->M;
 
     memcpy(e->x + row * n, x, (size_t)n * sizeof *x);
-    memcpy(e->P + row * n * n, P, (size_t)(n * n) * sizeof *P);
+    if (e->has_P)
+        memcpy(e->P + row * n * n, P, (size_t)(n * n) * sizeof *P);
     memcpy(e->mu + row * M, mu, (size_t)M * sizeof *mu);
     e->loglik[row] = loglik;
     e->us[row] = us;
@@ -106,7 +108,8 @@ int estimates_same(const struct estimates *a, const struct estimates *b)
 
     return rows == b->rows && a->n == b->n && a->M == b->M
         && same(a->x, b->x, rows * a->n)
-        && same(a->P, b->P, rows * a->n * a->n)
+        && a->has_P == b->has_P
+        && (!a->has_P || same(a->P, b->P, rows * a->n * a->n))
         && same(a->mu, b->mu, rows * a->M)
         && same(a->loglik, b->loglik, rows);
 }
@@ -174,7 +177,7 @@ void estimates_write(const struct estimates *e, const struct data_file *data,
     fprintf(out, "%s%s", data->run != NULL ? "run," : "", data->time_name);
     for (a = 0; a < n; a++)
         fprintf(out, ",x%d", a);
-    for (a = 0; a < n; a++)
+    for (a = 0; a < n && e->has_P; a++)
         for (b = a; b < n; b++)
             fprintf(out, n > 10 ? ",P%d_%d" : ",P%d%d", a, b);
     for (a = 0; a < e->M; a++)
@@ -189,7 +192,7 @@ void estimates_write(const struct estimates *e, const struct data_file *data,
         fputs(data->time_text[row], out);
         for (a = 0; a < n; a++)
             put(out, e->x[row * n + a]);
-        for (a = 0; a < n; a++)
+        for (a = 0; a < n && e->has_P; a++)
             for (b = a; b < n; b++)
                 put(out, e->P[(row * n + a) * n + b]);
         for (a = 0; a < e->M; a++)

@@ -15,7 +15,8 @@ struct estimates {
     long judged, rejected;      /* measurements, and those the gate rejected */
     int n, M;
     jl_real *x;                 /* [rows,n]; NaN in rows without estimate   */
-    jl_real *P;                 /* [rows,n,n]                               */
+    int has_P;                  /* 0 of kind cgimm                          */
+    jl_real *P;                 /* [rows,n,n] or NULL                       */
     jl_real *mu;                /* [rows,M]                                 */
     jl_real *loglik;            /* [rows]                                   */
     struct diagnostics *diagnostics;    /* more columns; or NULL            */
@@ -31,7 +32,8 @@ int estimates_open(struct estimates *e, const struct data_file *data,
 int estimates_grow(struct estimates *e, long rows);
 void estimates_close(struct estimates *e);
 
-/* Take down a row: x [n], P [n,n], mu [M], loglik, and the time it took. */
+/* Take down a row: x [n], P [n,n] or NULL, mu [M], loglik, and the time it
+ * took. */
 void estimates_note(struct estimates *e, long row, const jl_real *x,
                     const jl_real *P, const jl_real *mu, jl_real loglik,
                     double us);
@@ -50,9 +52,9 @@ double estimates_apart(const struct estimates *a, const struct estimates *b);
 long estimates_times(const struct estimates *e, double *median_us,
                      double *p99_us);
 
-/* As CSV: time (and run), x, P upper triangle, mu, loglik, and diagnostics if
- * there are; all rows, or, when `partial`, those that were done and a last line
- * that says so. */
+/* As CSV: time (and run), x, P upper triangle, mu, loglik, and diagnostics, P
+ * and these if they are there; all rows, or, when `partial`, those that were
+ * done and a last line that says so. */
 void estimates_write(const struct estimates *e, const struct data_file *data,
                      int partial, FILE *out);
 

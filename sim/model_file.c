@@ -5,18 +5,17 @@
 #include <string.h>
 
 #include "complain.h"
-#include "json_take.h"
+#include "model_parts.h"
 
 /* Covariances go up to the square of what states may be. */
 #define LARGE_COV (JL_LARGE * JL_LARGE)
 
-static int no_memory(const struct json_at *at)
+int model_no_memory(const struct json_at *at)
 {
     return complain(at->file, 0, NULL, "out of memory");
 }
 
-/* n m k zeroed reals; never NULL by being empty. */
-static jl_real *reals(int n, int m, int k)
+jl_real *model_reals(int n, int m, int k)
 {
     return calloc((size_t)n * (size_t)m * (size_t)k, sizeof(jl_real));
 }
@@ -58,9 +57,9 @@ static int take_cov(jl_real *A, const struct json_at *at, const char *key,
 
     if (json_take_matrix(A, at, key, n, n, LARGE_COV) != 0)
         return -1;
-    work = reals(n, n, 1);
+    work = model_reals(n, n, 1);
     if (work == NULL)
-        return no_memory(at);
+        return model_no_memory(at);
     status = jl_mat_check_cov(A, work, n);
     if (status == JL_OK && definite)
         status = jl_mat_cholesky(work, A, n);
@@ -98,13 +97,13 @@ static int check_distribution(const jl_real *p, const struct json_at *at,
     return 0;
 }
 
-static int take_mu0(struct model *model, const struct json_at *top, int needed)
+int model_take_mu0(struct model *model, const struct json_at *top, int needed)
 {
     int i, M = model->M;
 
-    model->mu0 = reals(M, 1, 1);
+    model->mu0 = model_reals(M, 1, 1);
     if (model->mu0 == NULL)
-        return no_memory(top);
+        return model_no_memory(top);
     if (!needed && !json_has(top, "mu0")) {
         for (i = 0; i < M; i++)
             model->mu0[i] = 1 / (jl_real)M;
@@ -115,13 +114,13 @@ static int take_mu0(struct model *model, const struct json_at *top, int needed)
     return check_distribution(model->mu0, top, "mu0", M);
 }
 
-static int take_Pi(struct model *model, const struct json_at *top)
+int model_take_Pi(struct model *model, const struct json_at *top)
 {
     int i, status, M = model->M;
 
-    model->Pi = reals(M, M, 1);
+    model->Pi = model_reals(M, M, 1);
     if (model->Pi == NULL)
-        return no_memory(top);
+        return model_no_memory(top);
     if (json_take_matrix(model->Pi, top, "Pi", M, M, JL_REAL_MAX) != 0)
         return -1;
     for (i = 0; i < M; i++) {
@@ -140,9 +139,9 @@ static int take_sojourn(struct model *model, const struct json_at *top)
 {
     int i, M = model->M;
 
-    model->sojourn_s = reals(M, 1, 1);
+    model->sojourn_s = model_reals(M, 1, 1);
     if (model->sojourn_s == NULL)
-        return no_memory(top);
+        return model_no_memory(top);
     if (json_take_vector(model->sojourn_s, top, "sojourn_s", M,
                          JL_REAL_MAX) != 0)
         return -1;
@@ -175,11 +174,11 @@ static int take_start(struct model *model, const struct json_at *at, int mode,
                       int k)
 {
     int n = model->n, i, j, error;
-    jl_real *x = reals(k, k + 1, 1), *P = x + k;
+    jl_real *x = model_reals(k, k + 1, 1), *P = x + k;
     const int *map = k < n ? model->map[mode] : NULL;
 
     if (x == NULL)
-        return no_memory(at);
+        return model_no_memory(at);
     error = json_take_vector(x, at, "x0", k, JL_LARGE) != 0
         || take_cov(P, at, "P0", k, 0) != 0;
     for (i = 0; i < k && !error; i++) {
@@ -224,10 +223,10 @@ static int take_starts(struct model *model, const struct json_at *top)
             : json_wrong(top, "x0", "missing: only a model of the catalogue "
                          "can start at the first measurement");
 
-    model->x0 = reals(M, n, 1);
-    model->P0 = reals(M, n, n);
+    model->x0 = model_reals(M, n, 1);
+    model->P0 = model_reals(M, n, n);
     if (model->x0 == NULL || model->P0 == NULL)
-        return no_memory(top);
+        return model_no_memory(top);
     for (i = 0; i < M; i++) {
         if (!at_top && json_entry(&mode, top, "modes", i) != 0)
             return -1;
@@ -253,7 +252,7 @@ static int make_modes(struct model *model, const struct json_at *top,
         octets += (size_t)JL_MODE_MEM(n[i], m, p[i]) * sizeof(jl_real);
     model->modes = malloc(octets);
     if (model->modes == NULL)
-        return no_memory(top);
+        return model_no_memory(top);
     mem = (jl_real *)(void *)(model->modes + M);
     for (i = 0; i < M; i++) {
         int cap = JL_MODE_MEM(n[i], m, p[i]);
@@ -286,13 +285,13 @@ static int take_matrices(jl_mode *mode, const struct json_at *at)
 {
     int n = mode->n, m = mode->m, p = mode->p, error, status = JL_OK;
     int own_mean = json_has(at, "w_bar");
-    jl_real *mem = reals(1, 1, JL_MODE_MEM(n, m, p) + p
-                         + JL_MODE_SCRATCH(n, m, p));
+    jl_real *mem = model_reals(1, 1, JL_MODE_MEM(n, m, p) + p
+                               + JL_MODE_SCRATCH(n, m, p));
     jl_real *F = mem, *G = F + n * n, *Q = G + n * p, *w_bar = Q + p * p;
     jl_real *H = w_bar + p, *R = H + m * n, *scratch = R + m * m;
 
     if (mem == NULL)
-        return no_memory(at);
+        return model_no_memory(at);
     error = json_take_matrix(F, at, "Phi", n, n, JL_LARGE)
         || json_take_matrix(G, at, "Gamma", n, p, JL_LARGE)
         || take_cov(Q, at, "Q", p, 0)
@@ -338,14 +337,13 @@ static int read_matrices(struct model *model, const struct json_at *top)
         if (json_entry(&mode, top, "modes", i) != 0
             || take_matrices(&model->modes[i], &mode) != 0)
             return -1;
-    return take_Pi(model, top);
+    return model_take_Pi(model, top);
 }
 
 /* --- modes of the catalogue -------------------------------------------- */
 
-/* A number above 0; `usual` when it may be left out, else 0. */
-static int take_above_0(jl_real *value, const struct json_at *at,
-                        const char *key, jl_real usual)
+int model_take_above_0(jl_real *value, const struct json_at *at,
+                       const char *key, jl_real usual)
 {
     *value = usual;
     if (usual > 0 && !json_has(at, key))
@@ -421,7 +419,7 @@ static int take_motion(jl_motion *motion, const struct json_at *mode)
     if (motion->kind == JL_MOTION_CT)
         return json_take_real(&motion->turn_rate, mode, "turn_rate");
     if (motion->kind == JL_MOTION_SINGER)
-        return take_above_0(&motion->tau_s, mode, "tau_s", 0);
+        return model_take_above_0(&motion->tau_s, mode, "tau_s", 0);
     return 0;
 }
 
@@ -430,12 +428,12 @@ static int take_motion(jl_motion *motion, const struct json_at *mode)
 static int try_motion(const struct model *model, const struct json_at *mode,
                       int i)
 {
-    jl_real *mem = reals(model->n, model->n, 2);
+    jl_real *mem = model_reals(model->n, model->n, 2);
     jl_real *x = mem, *P = mem + model->n, *z;
     int status;
 
     if (mem == NULL)
-        return no_memory(mode);
+        return model_no_memory(mode);
     z = P + model->n * model->n;        /* n + n n + m <= 2 n n, as n >= 2 m */
     status = jl_mode_motion(&model->modes[i], &model->motions[i], 1);
     if (status == JL_OK)
@@ -466,9 +464,9 @@ static int take_prior(struct model *model, const struct json_at *top,
                           (double)model->a0_std);
     model->map = calloc(1, (size_t)model->M * sizeof *model->map
                         + (size_t)(2 * axes) * sizeof *two);
-    model->prior_x = reals(model->n, 2, 1);
+    model->prior_x = model_reals(model->n, 2, 1);
     if (model->map == NULL || model->prior_x == NULL)
-        return no_memory(top);
+        return model_no_memory(top);
     two = (int *)(void *)(model->map + model->M);
     for (i = 0; i < 2 * axes; i++)
         two[i] = i / 2 * order + i % 2;
@@ -490,7 +488,7 @@ static int take_motions(struct model *model, const struct json_at *top,
 
     model->motions = calloc((size_t)model->M, sizeof *model->motions);
     if (model->motions == NULL)
-        return no_memory(top);
+        return model_no_memory(top);
     for (i = 0; i < model->M; i++) {
         model->motions[i] = *common;
         if (json_entry(&mode, top, "modes", i) != 0
@@ -520,9 +518,9 @@ static int read_catalogue(struct model *model, const struct json_at *top)
     if (json_only(top, keys) != 0
         || json_take_count(&common.axes, top, "axes", 1, JL_MAX_STATES / 3)
         || json_take_count(&common.order, top, "order", 2, 3) != 0
-        || take_above_0(&common.sigma_z, top, "sigma_z", 0) != 0
-        || take_above_0(&model->v0_std, top, "v0_std", 100) != 0
-        || take_above_0(&model->a0_std, top, "a0_std", 10) != 0)
+        || model_take_above_0(&common.sigma_z, top, "sigma_z", 0) != 0
+        || model_take_above_0(&model->v0_std, top, "v0_std", 100) != 0
+        || model_take_above_0(&model->a0_std, top, "a0_std", 10) != 0)
         return -1;
     model->n = common.axes * common.order;
     model->m = common.axes;
@@ -532,16 +530,17 @@ static int read_catalogue(struct model *model, const struct json_at *top)
         return json_wrong(top, "sojourn_s", json_has(top, "Pi")
                           ? "there is Pi, too: one of them is enough"
                           : "missing, and no Pi either");
-    return json_has(top, "Pi") ? take_Pi(model, top)
+    return json_has(top, "Pi") ? model_take_Pi(model, top)
                                : take_sojourn(model, top);
 }
 
 /* --- the file ---------------------------------------------------------- */
 
-static int check_kind(const struct json_at *top)
+/* 1 if the kind is cgimm, 0 if it is imm, -1 after a message. */
+static int take_kind(const struct json_at *top)
 {
     static const char *const others[] = {
-        "cgimm", "mekf", "particle", "dropout"
+        "mekf", "particle", "dropout"
     };
     const char *kind;
     size_t i;
@@ -552,24 +551,28 @@ static int check_kind(const struct json_at *top)
         if (strcmp(kind, others[i]) == 0)
             return json_wrong(top, "kind",
                               "'%s' is not supported by this version", kind);
-    if (strcmp(kind, "imm") != 0)
-        return json_wrong(top, "kind", "'%.40s' is unknown", kind);
-    return 0;
+    if (strcmp(kind, "cgimm") == 0)
+        return 1;
+    return strcmp(kind, "imm") == 0 ? 0
+        : json_wrong(top, "kind", "'%.40s' is unknown", kind);
 }
 
 static int read_model(struct model *model, const struct json_at *top)
 {
     struct json_at first;
-    int catalogue;
+    int cgimm = take_kind(top), catalogue;
 
-    if (check_kind(top) != 0
+    if (cgimm < 0
         || json_take_list(&model->M, top, "modes", 1, JL_MAX_MODES) != 0
         || json_entry(&first, top, "modes", 0) != 0)
         return -1;
+    if (cgimm)
+        return model_read_cgimm(model, top) != 0 ? -1
+            : model_take_mu0(model, top, 1);
     catalogue = json_has(top, "axes") || json_has(&first, "type");
     if ((catalogue ? read_catalogue : read_matrices)(model, top) != 0)
         return -1;
-    if (take_mu0(model, top, !catalogue) != 0)
+    if (model_take_mu0(model, top, !catalogue) != 0)
         return -1;
     return take_starts(model, top);
 }
@@ -587,7 +590,8 @@ int model_read(struct model *model, const char *path)
     }
     top.object = root;
     model->path = strdup(path);
-    error = model->path != NULL ? read_model(model, &top) : no_memory(&top);
+    error = model->path != NULL ? read_model(model, &top)
+                                : model_no_memory(&top);
     json_decref(root);
     if (error != 0)
         model_free(model);
@@ -599,6 +603,7 @@ void model_free(struct model *model)
     free(model->path);
     free(model->modes);
     free(model->motions);
+    free(model->gains);
     free(model->map);
     free(model->prior_x);
     free(model->sojourn_s);

@@ -1,13 +1,16 @@
-/* Model files: JSON of kind imm (../tests/golden has examples; keys: --help of
- * filter), as arrays ready for the library. */
+/* Model files: JSON of kind imm or cgimm (../tests/golden has examples; keys:
+ * README.md, --help of filter), as arrays ready for the library. */
 #ifndef SIM_MODEL_FILE_H
 #define SIM_MODEL_FILE_H
 
+#include "jumplink/cgimm.h"
 #include "jumplink/model.h"
 
 struct model {
     char *path;
     int M, n, m;
+    jl_cg_gains *gains;         /* [M] of kind cgimm, or NULL: kind imm     */
+    jl_real T, R;               /* of kind cgimm, that has no modes, no P0  */
     jl_mode *modes;             /* [M]; of the catalogue: sized, not filled */
     jl_motion *motions;         /* [M] of the catalogue, or NULL: matrices  */
     const int **map;            /* [M] what modes have of the n components

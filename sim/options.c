@@ -146,7 +146,7 @@ const char *options_form(const struct options *o)
 int options_take(struct options *o, int c, char *const *argv)
 {
     const char *value = optarg;
-    static const char *const filters[] = { "imm", "kf", NULL };
+    static const char *const filters[] = { "imm", "cgimm", "kf", NULL };
     static const char *const holds[] = { "none", "detect", "column", NULL };
     static const char *const exchanges[] = { "gather", "reduce", NULL };
     long number = 0;
@@ -155,7 +155,7 @@ int options_take(struct options *o, int c, char *const *argv)
     switch (c) {
     case 1001:
         i = choose(o->command, "filter", value, filters);
-        o->kf = i;
+        o->filter = (enum filter)(i + FILTER_IMM);
         return i < 0 ? 2 : 0;
     case 1002:
         status = option_long(&number, o->command, "mode", value, 0,

@@ -16,12 +16,14 @@ enum hold {                     /* which rows count as arrived */
 /* BY_HAND: over LCM, with PEs that somebody else starts. */
 enum port { PORT_NONE, PORT_LOOP, PORT_THREADS, PORT_LCM, PORT_BY_HAND };
 
+enum filter { FILTER_OF_KIND, FILTER_IMM, FILTER_CGIMM, FILTER_KF };
+
 struct live_input;
 
 struct options {
     const char *command;        /* for messages: "filter"                   */
-    int kf;                     /* 0: imm, 1: kf of one mode                */
-    int mode;                   /* ... this one; -1: the only one           */
+    enum filter filter;         /* OF_KIND: the one the model is of         */
+    int mode;                   /* of FILTER_KF; -1: the only one           */
     const jl_kf_form *form;
     double gate;                /* a good measurement passes with this
                                    probability; 0: no gate                  */
@@ -67,7 +69,8 @@ struct options {
     { "help", no_argument, NULL, 'h' }
 
 #define COMMON_HELP \
-    "  --filter imm|kf   all modes (default), or the Kalman filter of one\n" \
+    "  --filter imm|cgimm|kf  all modes, by the model's kind (default), or\n" \
+    "                    the Kalman filter of one mode of kind imm\n" \
     "  --mode J          ... of this one, from 0 (default: the only one)\n" \
     "  --form joseph|standard|sqrt  how covariances are kept and updated\n" \
     "                    (default joseph; sqrt: as factors)\n" \
@@ -85,7 +88,10 @@ struct options {
     "(default 100) and acceleration (10) before anything is known.  A mode\n" \
     "may have order 2 beside others of order 3, the model's: to them its\n" \
     "acceleration is 0 +- a0_std.  Or modes by matrices: Phi, Gamma, Q, H,\n" \
-    "R, and n, m, Pi, mu0 at the top; x0, P0 in each mode or at the top.\n\n"
+    "R, and n, m, Pi, mu0 at the top; x0, P0 in each mode or at the top.\n" \
+    "Or kind cgimm, constant gains: T, R, Pi, mu0, axes (default 1) at the\n" \
+    "top; modes with x0 and gains w0, winf, kc, or with x0, an order and a\n" \
+    "Q for each at the top, which make the gains.  A row is a step of T.\n\n"
 #define DATA_HELP \
     "  --hold HOW        which measurements count as lost: none; detect:\n" \
     "                    those that repeat the row before exactly; column:\n" \

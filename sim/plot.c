@@ -284,6 +284,20 @@ int plot_track(const char *folder, const char *name, const char *title,
     return finish(&out, folder, name);
 }
 
+int plot_curves(const char *folder, const char *name, const char *title,
+                const char *y_label, const struct plot_series *series,
+                int count)
+{
+    struct out_file out;
+
+    if (begin(&out, folder, name) != 0)
+        return -1;
+    put_head(out.stream, name, title, "time in s", y_label);
+    fprintf(out.stream, "set autoscale xfix\n");
+    put_series(out.stream, series, count, "");
+    return finish(&out, folder, name);
+}
+
 int plot_errors(const char *folder, const char *name, const char *title,
                 const char *y_label, const struct plot_series *series,
                 int count)

@@ -32,6 +32,11 @@ int plot_modes(const char *folder, const char *name, const char *title,
                const char *file, const char *time, const char *const *mode,
                int M);
 
+/* Curves over time in seconds; y_label with its unit. */
+int plot_curves(const char *folder, const char *name, const char *title,
+                const char *y_label, const struct plot_series *series,
+                int count);
+
 /* Errors over time in seconds, with a logarithmic scale; y_label with its
  * unit, "velocity error in m/s". */
 int plot_errors(const char *folder, const char *name, const char *title,

@@ -20,11 +20,34 @@ static void pick_start(struct model *model, int j, int k)
     }
 }
 
+/* What a filter without covariances cannot do. */
+static int check_cgimm(const struct model *model, const struct options *o)
+{
+    const char *option = o->filter == FILTER_IMM ? "--filter imm"
+        : o->filter == FILTER_KF ? "--filter kf"
+        : o->form != &jl_kf_joseph ? "--form"
+        : o->gate > 0 ? "--gate"
+        : o->diagnostics ? "--diagnostics" : NULL;
+
+    if (option != NULL)
+        return misuse(o->command, "%s needs covariances, and %s is of kind "
+                      "cgimm", option, model->path);
+    if (o->port != PORT_NONE)
+        return misuse(o->command, "%s is of kind cgimm, which runs serially",
+                      model->path);
+    return 0;
+}
+
 int run_pick_mode(struct model *model, const struct options *options)
 {
     int j = options->mode, k;
 
-    if (!options->kf)
+    if (model->gains == NULL && options->filter == FILTER_CGIMM)
+        return misuse(options->command, "--filter cgimm needs gains, and %s "
+                      "is of kind imm", model->path);
+    if (model->gains != NULL && check_cgimm(model, options) != 0)
+        return 2;
+    if (options->filter != FILTER_KF)
         return options->mode < 0 ? 0
             : misuse(options->command, "--mode goes with --filter kf");
     if (j < 0 && model->M > 1)

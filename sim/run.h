@@ -17,9 +17,12 @@ struct traffic {
 
 /* Each runs the filter over all rows of the record into *e.  On failure prints
  * one line (which row, what) and returns the program's exit status, 1; what
- * was estimated before is in *e.  Otherwise returns 0. */
+ * was estimated before is in *e.  Otherwise returns 0.  run_serial runs a model
+ * of kind cgimm by run_cgimm. */
 int run_serial(struct estimates *e, const struct model *model,
                const struct data_file *data, const struct options *options);
+int run_cgimm(struct estimates *e, const struct model *model,
+              const struct data_file *data, const struct options *options);
 int run_inside(struct estimates *e, struct traffic *traffic,
                const struct model *model, const struct data_file *data,
                const struct options *options);
@@ -85,7 +88,8 @@ int run_failed(const struct data_file *data, long row, int status,
 /* 1 if the status comes from a channel and not from the filter. */
 int run_is_channels(int status);
 
-/* The model with only the mode that the kf of options works on.
+/* Check that the model's kind and the options go together, and leave it only the
+ * mode that the kf of options works on.
  * Returns 0, or 2 after a message. */
 int run_pick_mode(struct model *model, const struct options *options);
 

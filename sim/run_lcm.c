@@ -76,7 +76,7 @@ static void become_pe(int pe, const char *url, const char *run,
     }
     argv[n++] = "--form";
     argv[n++] = options_form(options);
-    if (options->kf) {
+    if (options->filter == FILTER_KF) {
         argv[n++] = "--filter";
         argv[n++] = "kf";
         if (options->mode >= 0) {

@@ -35,7 +35,8 @@ jl_u32 run_fingerprint(const struct model *model,
                           (int)strlen(form));
 
     more[0] = (unsigned char)options->pes;
-    more[1] = (unsigned char)(options->kf ? options->mode + 2 : 0);
+    more[1] = (unsigned char)(options->filter == FILTER_KF ? options->mode + 2
+                                                           : 0);
     more[2] = JL_REAL_OCTETS;
     more[3] = (unsigned char)options->topology;
     more[4] = (unsigned char)options->exchange;

@@ -19,6 +19,8 @@ int run_serial(struct estimates *e, const struct model *model,
     long row;
     int status = JL_OK;
 
+    if (model->gains != NULL)
+        return run_cgimm(e, model, data, options);
     if (feed_open(&feed, data, model, options) != 0)
         return 2;
     if (bank_open(&bank, model, options) != 0) {

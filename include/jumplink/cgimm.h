@@ -20,9 +20,9 @@
  * and divisions, 27 additions, an exponential (tests/count), where the paper
  * has 76 and 46, and an IMM of matrices 10 times as many.
  *
- * What it is worth (paper's scenario): positions as good as the IMM's; in the
- * quiet phase after a manoeuvre velocities are 1.18, accelerations 1.36 times
- * as far off.  Whether a pair of modes is fit for it: jl_cg_coupling.
+ * What it is worth (paper's scenario, `jumplink sim --scenario manoeuvre1d`):
+ * positions as good as the IMM's; in the quiet phase after a manoeuvre
+ * velocities are 1.17, accelerations 1.34 times as far off.  Whether a pair of modes is fit for it: jl_cg_coupling.
  */
 #ifndef JL_CGIMM_H
 #define JL_CGIMM_H
@@ -175,6 +175,50 @@ void jl_cgimm_combine(jl_cgimm *cg);
 
 /* The combined state x [axes,order], as jl_cgimm_set has it. */
 void jl_cgimm_estimate(const jl_cgimm *cg, jl_real *x);
+
+/* --- a baseline ---------------------------------------------------------- */
+
+/* One alpha-beta filter, an axis, with two levels of steady gains: low (0) for a
+ * target that flies straight, high (1) for one that manoeuvres.  The paper
+ * compares with such a filter; this is a form of our own.  A step:
+ *     x- = F x,  nu = z - x-[0]
+ *     s = s + c (nu - s)
+ *     d = sum over axes s^2 / (S c / (2 - c)),  S = R / (1 - alpha)
+ *     level 0 and d > up: 1;  level 1 and d < down: 0
+ *     x = x- + (alpha, beta / T) nu,  gains of the level
+ * With gains that fit the target's noise nu is white, of variance S, and d
+ * chi-square with as many degrees of freedom as axes.  At an acceleration a both
+ * levels stay behind for good, by (1 - alpha) a T^2 / beta in position and
+ * a T (2 alpha - beta) / 2 beta in velocity: what the IMM does without. */
+typedef struct jl_cg_adaptive {
+    int axes;
+    int level;
+    jl_real T;
+    jl_real w[2][2];            /* alpha, beta of each level                */
+    jl_real c, up, down;
+    jl_real per_d[2];           /* (2 - c) / (c S) of each level            */
+    jl_real *x;                 /* [axes,2] p, v                            */
+    jl_real *s;                 /* [axes]                                   */
+} jl_cg_adaptive;
+
+/* Reals of state. */
+#define JL_CG_ADAPTIVE_STATE(axes) (3 * (axes))
+
+/* Gains low, high [2] (jl_cg_steady), smoothing c in (0, 1], 0 <= down <= up;
+ * mem [cap], cap >= JL_CG_ADAPTIVE_STATE(axes).  x = 0, level 1.
+ * Returns JL_OK, JL_EDIM (axes outside 1..64), JL_ENOMEM, JL_ERANGE (gains of no
+ * stable filter, or another argument); *f is untouched on error. */
+int jl_cg_adaptive_init(jl_cg_adaptive *f, int axes, jl_real T, jl_real R,
+                        const jl_real *low, const jl_real *high, jl_real c,
+                        jl_real up, jl_real down, jl_real *mem, int cap);
+
+/* Set x [axes,2]; s = 0, level 1.
+ * Returns JL_OK or JL_ENONFINITE: unchanged then. */
+int jl_cg_adaptive_set(jl_cg_adaptive *f, const jl_real *x);
+
+/* One step with z [axes]; NULL: no measurement, x is predicted.
+ * Returns JL_OK or JL_ENONFINITE: unchanged then. */
+int jl_cg_adaptive_step(jl_cg_adaptive *f, const jl_real *z);
 
 #ifdef __cplusplus
 }
