@@ -10,6 +10,7 @@
 
 #include <string.h>
 
+#include "base/cc.h"
 #include "jumplink/mat.h"
 
 #define LOG_2PI JL_C(1.8378770664093454836)
@@ -20,6 +21,11 @@ static int in_common(const jl_cgimm *cg)
     int a = cg->gains[0].order, b = cg->gains[1].order;
 
     return a < b ? a : b;
+}
+
+static int is_pair(const jl_cgimm *cg)
+{
+    return cg->M == 2 && cg->gains[0].order == 2 && cg->gains[1].order == 3;
 }
 
 /* --- mix ----------------------------------------------------------------- */
@@ -42,27 +48,33 @@ static void between(jl_real *x, const jl_cgimm *cg, jl_real share,
     }
 }
 
+/* The share of `part` in c; c is 0 where a mode cannot be entered. */
+JL_INLINE jl_real share(jl_real *c, jl_real part, jl_real rest, jl_real none)
+{
+    *c = part + rest;
+    if (*c >= JL_REAL_MIN)
+        return part / *c;
+    *c = 0;
+    return none;
+}
+
 /* e[t] is the share of mode 0 in mode t's mixture.  A row of Pi sums to 1: the
  * larger part of mu_1 is what the smaller one leaves. */
 static void foresee_two(jl_cgimm *cg)
 {
-    const jl_real *Pi = cg->Pi;
-    int less = Pi[2] > Pi[3], t;
-    jl_real from_0[2], from_1[2];
+    const jl_real *Pi = cg->Pi, mu_1 = cg->mu[1];
+    const jl_real from_00 = Pi[0] * cg->mu[0], from_01 = Pi[1] * cg->mu[0];
+    jl_real from_10, from_11;
 
-    from_0[0] = Pi[0] * cg->mu[0];
-    from_0[1] = Pi[1] * cg->mu[0];
-    from_1[less] = Pi[2 + less] * cg->mu[1];
-    from_1[1 - less] = cg->mu[1] - from_1[less];
-    for (t = 0; t < 2; t++) {
-        cg->c[t] = from_0[t] + from_1[t];
-        if (cg->c[t] >= JL_REAL_MIN) {
-            cg->e[t] = from_0[t] / cg->c[t];
-        } else {
-            cg->c[t] = 0;
-            cg->e[t] = (jl_real)(t == 0);
-        }
+    if (Pi[2] > Pi[3]) {
+        from_11 = Pi[3] * mu_1;
+        from_10 = mu_1 - from_11;
+    } else {
+        from_10 = Pi[2] * mu_1;
+        from_11 = mu_1 - from_10;
     }
+    cg->e[0] = share(&cg->c[0], from_00, from_10, 1);
+    cg->e[1] = share(&cg->c[1], from_01, from_11, 0);
 }
 
 /* e[t] is 1 / c_t, or 0 if the mode cannot be entered. */
@@ -222,17 +234,23 @@ int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z)
  * what the smaller one leaves, which so keeps its digits. */
 static void weigh_two(jl_cgimm *cg)
 {
-    const jl_real *l = cg->l, *q = cg->q, *c = cg->c;
-    jl_real more = cg->q_more + l[0] - l[1], other, sum;
-    int best = c[0] > 0 && (more > 0 || !(c[1] > 0)) ? 0 : 1, less;
+    const jl_real *l = cg->l, *q = cg->q, c_0 = cg->c[0], c_1 = cg->c[1];
+    const jl_real more = cg->q_more + l[0] - l[1];
+    jl_real part_0 = c_0, part_1 = c_1, sum;
+    int best = (more > 0 && c_0 > 0) || !(c_1 > 0) ? 0 : 1;
 
-    other = c[1 - best] * jl_exp(best == 0 ? -more : more);
-    if (!(c[1 - best] > 0))
-        other = 0;
-    sum = c[best] + other;
-    less = other < c[best] ? 1 - best : best;
-    cg->mu[less] = (less == best ? c[best] : other) / sum;
-    cg->mu[1 - less] = 1 - cg->mu[less];
+    if (best == 0)
+        part_1 = c_1 > 0 ? c_1 * jl_exp(-more) : 0;
+    else
+        part_0 = c_0 > 0 ? c_0 * jl_exp(more) : 0;
+    sum = part_0 + part_1;
+    if (part_0 < part_1) {
+        cg->mu[0] = part_0 / sum;
+        cg->mu[1] = 1 - cg->mu[0];
+    } else {
+        cg->mu[1] = part_1 / sum;
+        cg->mu[0] = 1 - cg->mu[1];
+    }
     cg->loglik = q[best] + l[best] + jl_log(sum);
 }
 
@@ -308,6 +326,10 @@ void jl_cgimm_combine(jl_cgimm *cg)
 {
     int state = 3 * cg->axes, i, j;
 
+    if (is_pair(cg)) {
+        jli_pair_combine(cg);
+        return;
+    }
     if (cg->M == 2) {
         combine_two(cg);
         return;
@@ -325,9 +347,15 @@ int jl_cgimm_step(jl_cgimm *cg, const jl_real *z)
     if (!is_usable(cg, z))
         return JL_ENONFINITE;
     jl_cgimm_foresee(cg);
-    for (j = 0; j < cg->M; j++) {
-        jl_cgimm_mix_mode(cg, j);
-        filter(cg, j, z);
+    if (is_pair(cg) && z != NULL && !(cg->moving[0] > 0)
+        && !(cg->moving[1] > 0)) {
+        jli_pair_filter(cg, z);
+        cg->stage = JLI_CG_FILTERED;
+    } else {
+        for (j = 0; j < cg->M; j++) {
+            jl_cgimm_mix_mode(cg, j);
+            filter(cg, j, z);
+        }
     }
     (void)jl_cgimm_weigh(cg, z);
     jl_cgimm_combine(cg);
