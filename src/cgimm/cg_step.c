@@ -6,11 +6,10 @@
  *
  * Modes are mixed and filtered in `mixed`; weigh, which cannot fail, makes that
  * the state, and the gains used the present ones. */
-#include "cgimm/cg_gains.h"
+#include "cgimm/cg_two.h"
 
 #include <string.h>
 
-#include "base/cc.h"
 #include "jumplink/mat.h"
 
 #define LOG_2PI JL_C(1.8378770664093454836)
@@ -48,33 +47,15 @@ static void between(jl_real *x, const jl_cgimm *cg, jl_real share,
     }
 }
 
-/* The share of `part` in c; c is 0 where a mode cannot be entered. */
-JL_INLINE jl_real share(jl_real *c, jl_real part, jl_real rest, jl_real none)
-{
-    *c = part + rest;
-    if (*c >= JL_REAL_MIN)
-        return part / *c;
-    *c = 0;
-    return none;
-}
-
-/* e[t] is the share of mode 0 in mode t's mixture.  A row of Pi sums to 1: the
- * larger part of mu_1 is what the smaller one leaves. */
+/* e[t] is the share of mode 0 in mode t's mixture. */
 static void foresee_two(jl_cgimm *cg)
 {
-    const jl_real *Pi = cg->Pi, mu_1 = cg->mu[1];
-    const jl_real from_00 = Pi[0] * cg->mu[0], from_01 = Pi[1] * cg->mu[0];
-    jl_real from_10, from_11;
+    struct jli_two c, share = jli_foresee_two(&c, cg->Pi, cg->mu);
 
-    if (Pi[2] > Pi[3]) {
-        from_11 = Pi[3] * mu_1;
-        from_10 = mu_1 - from_11;
-    } else {
-        from_10 = Pi[2] * mu_1;
-        from_11 = mu_1 - from_10;
-    }
-    cg->e[0] = share(&cg->c[0], from_00, from_10, 1);
-    cg->e[1] = share(&cg->c[1], from_01, from_11, 0);
+    cg->c[0] = c.of_0;
+    cg->c[1] = c.of_1;
+    cg->e[0] = share.of_0;
+    cg->e[1] = share.of_1;
 }
 
 /* e[t] is 1 / c_t, or 0 if the mode cannot be entered. */
@@ -230,28 +211,15 @@ int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z)
 
 /* --- weigh --------------------------------------------------------------- */
 
-/* By the better mode's likelihood, so that nothing overflows.  The larger mu is
- * what the smaller one leaves, which so keeps its digits. */
 static void weigh_two(jl_cgimm *cg)
 {
-    const jl_real *l = cg->l, *q = cg->q, c_0 = cg->c[0], c_1 = cg->c[1];
-    const jl_real more = cg->q_more + l[0] - l[1];
-    jl_real part_0 = c_0, part_1 = c_1, sum;
-    int best = (more > 0 && c_0 > 0) || !(c_1 > 0) ? 0 : 1;
+    struct jli_two c, l;
 
-    if (best == 0)
-        part_1 = c_1 > 0 ? c_1 * jl_exp(-more) : 0;
-    else
-        part_0 = c_0 > 0 ? c_0 * jl_exp(more) : 0;
-    sum = part_0 + part_1;
-    if (part_0 < part_1) {
-        cg->mu[0] = part_0 / sum;
-        cg->mu[1] = 1 - cg->mu[0];
-    } else {
-        cg->mu[1] = part_1 / sum;
-        cg->mu[0] = 1 - cg->mu[1];
-    }
-    cg->loglik = q[best] + l[best] + jl_log(sum);
+    c.of_0 = cg->c[0];
+    c.of_1 = cg->c[1];
+    l.of_0 = cg->l[0];
+    l.of_1 = cg->l[1];
+    jli_weigh_two(cg, c, l);
 }
 
 static void weigh_all(jl_cgimm *cg)
@@ -280,9 +248,7 @@ static void weigh(jl_cgimm *cg)
     for (j = 0; j < cg->M; j++) {
         if (cg->moving[j] > 0)
             advance(cg, j);
-        cg->l[j] *= cg->g[j];
-        if (!(cg->l[j] >= -JL_REAL_MAX))
-            cg->l[j] = -JL_REAL_MAX;
+        cg->l[j] = jli_cg_bounded(cg->g[j] * cg->l[j]);
     }
     if (cg->M == 2)
         weigh_two(cg);
@@ -346,16 +312,16 @@ int jl_cgimm_step(jl_cgimm *cg, const jl_real *z)
 
     if (!is_usable(cg, z))
         return JL_ENONFINITE;
-    jl_cgimm_foresee(cg);
     if (is_pair(cg) && z != NULL && !(cg->moving[0] > 0)
         && !(cg->moving[1] > 0)) {
-        jli_pair_filter(cg, z);
-        cg->stage = JLI_CG_FILTERED;
-    } else {
-        for (j = 0; j < cg->M; j++) {
-            jl_cgimm_mix_mode(cg, j);
-            filter(cg, j, z);
-        }
+        jli_pair_step(cg, z);
+        cg->stage = JLI_CG_IDLE;
+        return JL_OK;
+    }
+    jl_cgimm_foresee(cg);
+    for (j = 0; j < cg->M; j++) {
+        jl_cgimm_mix_mode(cg, j);
+        filter(cg, j, z);
     }
     (void)jl_cgimm_weigh(cg, z);
     jl_cgimm_combine(cg);
