@@ -90,10 +90,6 @@ $(BUILD)/obj_f32/%.o: %.c $(BUILD)/flags
 SIZES := %/src/kf/kf_sizes.o
 $(SIZES): private CFLAGS += -O3 -ffunction-sections -fdata-sections
 
-# A step of the constant-gain IMM reads at once what it has just written, number
-# by number: read in pairs, they would have to wait for the memory (a tenth more).
-%/src/cgimm/cg_step.o %/src/cgimm/cg_pair.o: private CFLAGS += -fno-tree-slp-vectorize
-
 # Two notes that change only when what they say changes, so that other flags
 # or a source that is gone also rebuild what they concern.
 $(BUILD)/flags: NOTE = $(CC) $(CORE) $(HOST) $(CFLAGS)

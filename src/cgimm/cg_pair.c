@@ -3,7 +3,7 @@
  * same sums in the same order as stage by stage (cg_step.c), so the same bits.
  *
  * Of what the two have the difference d = x_0 - x_1 is formed once and used
- * three times: xhat = x_1 + mu_0 d, and in the next step x0_t = x_1 + mu_0t d. */
+ * three times: xhat = x_1 + mu_0 d, in the next step x0_t = x_1 + mu_0t d. */
 #include "cgimm/cg_two.h"
 
 /* Mix and filter; returns the sums of nu^2. */

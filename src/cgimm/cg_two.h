@@ -11,7 +11,8 @@ struct jli_two {
 };
 
 /* part / c, the share of mode 0; c is 0 where a mode cannot be entered. */
-JL_INLINE jl_real jli_share(jl_real *c, jl_real part, jl_real rest, jl_real none)
+JL_INLINE jl_real jli_share(jl_real *c, jl_real part, jl_real rest,
+                            jl_real none)
 {
     *c = part + rest;
     if (*c >= JL_REAL_MIN)
