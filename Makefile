@@ -242,7 +242,7 @@ $(BUILD)/native/%.o: %.c $(BUILD)/flags
 $(BUILD)/native/%.o: %.cc $(BUILD)/flags
 	@mkdir -p $(@D); echo '  $@'; \
 	    $(CXX) -std=c++17 -Wall -Wextra -Iinclude -DNDEBUG -fno-math-errno $(CFLAGS) -MMD -MP -c $< -o $@
-$(BUILD)/bench/bench_sizes: $(patsubst %,$(BUILD)/native/tests/bench/%.o,bench_sizes sizes_jumplink sizes_plain sizes_eigen) \
+$(BUILD)/bench/bench_sizes: $(patsubst %,$(BUILD)/native/tests/bench/%.o,bench_sizes sizes_jumplink sizes_constant sizes_plain sizes_eigen) \
     $(BUILD)/obj/tests/bench/bench_samples.o $(BUILD)/libsim.a $(BUILD)/native/libjumplink.a
 	@mkdir -p $(@D); echo '  $@'; $(CXX) $(CFLAGS) -pthread $^ $(LIBS) -o $@
 

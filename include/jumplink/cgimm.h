@@ -18,7 +18,7 @@
  *
  * Two modes of order 2 and 3 with steady gains, one axis: 24 multiplications
  * and divisions, 27 additions, an exponential (tests/count), where the paper
- * has 76 and 46, and an IMM of matrices 10 times as many.
+ * has 76 and 46, and an IMM of matrices 11 times as many.
  *
  * What it is worth (paper's scenario, `jumplink sim --scenario manoeuvre1d`):
  * positions as good as the IMM's; in the quiet phase after a manoeuvre

@@ -6,7 +6,7 @@
  *
  * Modes are mixed and filtered in `mixed`; weigh, which cannot fail, makes that
  * the state, and the gains used the present ones. */
-#include "cgimm/cg_gains.h"
+#include "cgimm/cg_two.h"
 
 #include <string.h>
 
@@ -20,6 +20,11 @@ static int in_common(const jl_cgimm *cg)
     int a = cg->gains[0].order, b = cg->gains[1].order;
 
     return a < b ? a : b;
+}
+
+static int is_pair(const jl_cgimm *cg)
+{
+    return cg->M == 2 && cg->gains[0].order == 2 && cg->gains[1].order == 3;
 }
 
 /* --- mix ----------------------------------------------------------------- */
@@ -42,27 +47,15 @@ static void between(jl_real *x, const jl_cgimm *cg, jl_real share,
     }
 }
 
-/* e[t] is the share of mode 0 in mode t's mixture.  A row of Pi sums to 1: the
- * larger part of mu_1 is what the smaller one leaves. */
+/* e[t] is the share of mode 0 in mode t's mixture. */
 static void foresee_two(jl_cgimm *cg)
 {
-    const jl_real *Pi = cg->Pi;
-    int less = Pi[2] > Pi[3], t;
-    jl_real from_0[2], from_1[2];
+    struct jli_two c, share = jli_foresee_two(&c, cg->Pi, cg->mu);
 
-    from_0[0] = Pi[0] * cg->mu[0];
-    from_0[1] = Pi[1] * cg->mu[0];
-    from_1[less] = Pi[2 + less] * cg->mu[1];
-    from_1[1 - less] = cg->mu[1] - from_1[less];
-    for (t = 0; t < 2; t++) {
-        cg->c[t] = from_0[t] + from_1[t];
-        if (cg->c[t] >= JL_REAL_MIN) {
-            cg->e[t] = from_0[t] / cg->c[t];
-        } else {
-            cg->c[t] = 0;
-            cg->e[t] = (jl_real)(t == 0);
-        }
-    }
+    cg->c[0] = c.of_0;
+    cg->c[1] = c.of_1;
+    cg->e[0] = share.of_0;
+    cg->e[1] = share.of_1;
 }
 
 /* e[t] is 1 / c_t, or 0 if the mode cannot be entered. */
@@ -218,22 +211,15 @@ int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z)
 
 /* --- weigh --------------------------------------------------------------- */
 
-/* By the better mode's likelihood, so that nothing overflows.  The larger mu is
- * what the smaller one leaves, which so keeps its digits. */
 static void weigh_two(jl_cgimm *cg)
 {
-    const jl_real *l = cg->l, *q = cg->q, *c = cg->c;
-    jl_real more = cg->q_more + l[0] - l[1], other, sum;
-    int best = c[0] > 0 && (more > 0 || !(c[1] > 0)) ? 0 : 1, less;
+    struct jli_two c, l;
 
-    other = c[1 - best] * jl_exp(best == 0 ? -more : more);
-    if (!(c[1 - best] > 0))
-        other = 0;
-    sum = c[best] + other;
-    less = other < c[best] ? 1 - best : best;
-    cg->mu[less] = (less == best ? c[best] : other) / sum;
-    cg->mu[1 - less] = 1 - cg->mu[less];
-    cg->loglik = q[best] + l[best] + jl_log(sum);
+    c.of_0 = cg->c[0];
+    c.of_1 = cg->c[1];
+    l.of_0 = cg->l[0];
+    l.of_1 = cg->l[1];
+    jli_weigh_two(cg, c, l);
 }
 
 static void weigh_all(jl_cgimm *cg)
@@ -262,9 +248,7 @@ static void weigh(jl_cgimm *cg)
     for (j = 0; j < cg->M; j++) {
         if (cg->moving[j] > 0)
             advance(cg, j);
-        cg->l[j] *= cg->g[j];
-        if (!(cg->l[j] >= -JL_REAL_MAX))
-            cg->l[j] = -JL_REAL_MAX;
+        cg->l[j] = jli_cg_bounded(cg->g[j] * cg->l[j]);
     }
     if (cg->M == 2)
         weigh_two(cg);
@@ -308,6 +292,10 @@ void jl_cgimm_combine(jl_cgimm *cg)
 {
     int state = 3 * cg->axes, i, j;
 
+    if (is_pair(cg)) {
+        jli_pair_combine(cg);
+        return;
+    }
     if (cg->M == 2) {
         combine_two(cg);
         return;
@@ -324,6 +312,12 @@ int jl_cgimm_step(jl_cgimm *cg, const jl_real *z)
 
     if (!is_usable(cg, z))
         return JL_ENONFINITE;
+    if (is_pair(cg) && z != NULL && !(cg->moving[0] > 0)
+        && !(cg->moving[1] > 0)) {
+        jli_pair_step(cg, z);
+        cg->stage = JLI_CG_IDLE;
+        return JL_OK;
+    }
     jl_cgimm_foresee(cg);
     for (j = 0; j < cg->M; j++) {
         jl_cgimm_mix_mode(cg, j);

@@ -18,8 +18,8 @@
 #define NEAR 5e-11
 #endif
 
-/* Below it a foreseen probability is 0; above it none may vanish, but for float,
- * where e^l already does at -104. */
+/* Below it a foreseen probability is 0; above it none may vanish, but for
+ * float, where e^l already does at l = -104. */
 #define LEAST ((real)JL_REAL_MIN)
 
 typedef long double real;
