@@ -166,7 +166,7 @@ int jl_cgimm_step(jl_cgimm *cg, const jl_real *z);
  * is NULL.  foresee may be called at any time and starts the step anew, combine
  * right after weigh only: it has what the next mixing needs.
  * filter_mode and weigh return JL_OK, JL_EORDER (filter without foresee, weigh
- * without filter or after a failure), filter_mode JL_ENONFINITE (z). */
+ * without filter), filter_mode JL_ENONFINITE (z). */
 void jl_cgimm_foresee(jl_cgimm *cg);
 void jl_cgimm_mix_mode(jl_cgimm *cg, int j);
 int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z);

@@ -14,10 +14,10 @@
  * (Pan, Dai, Zhang 1997, sections 3-6, with their three exchanges made one.)
  *
  * A constant-gain IMM (cgimm.h) is spread likewise, with the bits of
- * jl_cgimm_step; its exchange has (status, nu^2, x_j) of a mode: of one axis
- * 2 + 8 (order + 1) octets, and 8 for the message.  Two PEs with a mode of order
- * 2 and one of 3 send 34 and 42 octets a step, where an IMM of 3 states sends
- * twice 90.
+ * jl_cgimm_step; its exchange has (status, nu^2, x_j) of a mode: in double, of
+ * one axis, 2 + 8 (order + 1) octets, and 8 for the message.  Two PEs with a
+ * mode of order 2 and one of 3 send 34 and 42 octets a step, where an IMM of 3
+ * states sends twice 90.
  *
  * For sticky chains (imm.h) the exchange may instead be an all-reduce, whose
  * messages hold, whatever the number of modes, one estimate a PE: what mixing
@@ -229,8 +229,8 @@ int jl_par_serve(jl_par *par, jl_real *scratch);
  * chain that is not sticky), JL_EGATE (an all-reduce and a gate: a PE's pool
  * would depend on the verdict of all); or the error of the channel that failed.
  * The combined estimate is computed on PE0 (on the others call jl_imm_combine;
- * an all-reduce computes it on all, and jl_imm_combine is of no use; so does a
- * jl_cgimm).  Of nis,
+ * an all-reduce computes it on all, and jl_imm_combine is of no use); that of a
+ * jl_cgimm on all.  Of nis,
  * nu and nis_mean a PE knows those of its own modes.
  * After the error of a channel the PEs may differ: the run is over. */
 int jl_par_step(jl_par *par, const jl_meas *meas, jl_real *scratch);

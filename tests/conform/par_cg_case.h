@@ -33,12 +33,14 @@ static inline void par_cg_init(struct par_cg_bank *bank, int M, int axes)
     int i, j;
 
     for (j = 0; j < M; j++) {
+        jl_real out = JL_C(0.02) * (jl_real)(j + 1);    /* leaving mode j */
+
         assert_int_equal(jl_cg_design(&bank->gains[j],
                                       par_cg_order(j, M, axes), 1,
                                       (jl_real)(100 + 700 * j), 1e4), 0);
         for (i = 0; i < M; i++)
-            Pi[j * M + i] = M == 1 ? 1 : i == j ? 1 - JL_C(0.02) * (jl_real)(j + 1)
-                : JL_C(0.02) * (jl_real)(j + 1) / (jl_real)(M - 1);
+            Pi[j * M + i] = M == 1 ? 1
+                : i == j ? 1 - out : out / (jl_real)(M - 1);
     }
     assert_int_equal(jl_cgimm_init(&bank->cg, M, bank->gains, axes, 1, 1e4,
                                    Pi, bank->mem,
@@ -83,7 +85,8 @@ static inline int par_cg_prepare(void *context, jl_cgimm *cg,
 }
 
 /* Measurement k: a path with noise, at last one that accelerates; some are
- * missing, one is an outlier, two cannot be used, some are as large as can be. */
+ * missing, one is an outlier, two cannot be used, some are as large as can
+ * be. */
 static inline void par_cg_meas(jl_meas *meas, jl_real *z, int k, int axes)
 {
     unsigned r = (unsigned)k * 2654435761u;

@@ -57,7 +57,7 @@ static void test_par_deadlines_grow_and_stay_numbers(void **state)
 
 /* --- octets -------------------------------------------------------------- */
 
-/* What jumplink/par.h says of a mode's message; and none is longer than there. */
+/* What jumplink/par.h says of a mode's message. */
 static void test_par_cg_messages_are_as_short_as_said(void **state)
 {
     static struct par_cg_bank bank;

@@ -451,11 +451,13 @@ static void step_alone(struct alone *a, int pe, jl_par *par)
             z[0] = k % 2 ? JL_REAL_MAX : jl_log(0);
         a->status[pe][k] = jl_par_step(par, &meas, bank->scratch);
         if (a->status[pe][k] != JL_OK) {
-            assert_same_bits(bank->cg.mu, before.mem + (bank->cg.mu - bank->mem),
+            const jl_cgimm *cg = &bank->cg;
+
+            assert_same_bits(cg->mu, before.mem + (cg->mu - bank->mem),
                              (size_t)a->M * sizeof *z);
-            assert_same_bits(bank->cg.x, before.mem + (bank->cg.x - bank->mem),
+            assert_same_bits(cg->x, before.mem + (cg->x - bank->mem),
                              (size_t)(3 * a->M) * sizeof *z);
-            assert_same_bits(bank->cg.w, before.mem + (bank->cg.w - bank->mem),
+            assert_same_bits(cg->w, before.mem + (cg->w - bank->mem),
                              (size_t)(3 * a->M) * sizeof *z);
         }
         if (k % 2)
