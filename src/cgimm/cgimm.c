@@ -66,7 +66,7 @@ static int check_gains(const jl_cg_gains *g)
         || !(g->start[0] > 0 && g->start[0] <= 1))
         return JL_ERANGE;
     for (i = 0; i < g->order; i++)
-        if (g->start[i] < 0 || g->k[i] < 0)
+        if (g->start[i] < 0 || !(g->k[i] >= 0 && g->k[i] <= JL_C(1e6)))
             return JL_ERANGE;
     return JL_OK;
 }

@@ -561,6 +561,7 @@ static void test_cgimm_init_refuses(void **state)
     REFUSED_GAINS(JL_ERANGE, bad[0].start[0] = 0);
     REFUSED_GAINS(JL_ERANGE, bad[1].start[1] = -1);
     REFUSED_GAINS(JL_ERANGE, bad[1].k[2] = -1);
+    REFUSED_GAINS(JL_ERANGE, bad[1].k[0] = JL_C(1.0e7));        /* alpha stays 1 */
     REFUSED_GAINS(JL_ENONFINITE, bad[0].steady[0] = NAN_);
     REFUSED_GAINS(JL_ENONFINITE, bad[1].start[2] = NAN_);
     REFUSED_GAINS(JL_ENONFINITE, bad[0].k[1] = (jl_real)INFINITY);
