@@ -1,6 +1,6 @@
 /* A step of the constant-gain IMM.
  *
- * Of two modes differences are formed once, d = x_0 - x_1, and used three times:
+ * Of two modes differences are formed once, d = x_0 - x_1, for three uses:
  * xhat = x_1 + mu_0 d, and in the next step x0_t = x_1 + mu_0t d.  A state that
  * only one mode has is that mode's share of it.
  *

@@ -466,7 +466,8 @@ static void test_cg_coupling_refuses(void **state)
     assert_int_equal(CALL(&a, &b, 0.9, 0.1, 0.5, 0.5, 1.0, -1.0), JL_ERANGE);
     assert_int_equal(CALL(&a, &b, 1.1, 0.1, 0.5, 0.5, 1.0, 1.0), JL_EPROB);
     assert_int_equal(CALL(&a, &b, 0.9, -0.1, 0.5, 0.5, 1.0, 1.0), JL_EPROB);
-    assert_int_equal(CALL(&a, &b, 0.9, 0.1, -0.5, 0.5, 1.0, 1.0), JL_EPROB);
+    assert_int_equal(CALL(&a, &b, 0.9, 0.1, 1.5, 0.5, 1.0, 1.0), JL_EPROB);
+    assert_int_equal(CALL(&a, &b, 0.9, 0.1, 0.5, -0.5, 1.0, 1.0), JL_EPROB);
     assert_int_equal(CALL(&a, &b, 0.0, 0.1, 1.0, 0.0, 1.0, 1.0), JL_EPROB);
     assert_int_equal(jl_cg_coupling_of(&c, &a, &b, (jl_real)NAN, 0, 1, 0, 1, 1),
                      JL_EPROB);
