@@ -12,8 +12,6 @@
 #include "private_net.h"
 
 #define CHILD_SECONDS 100U
-#define LINGER_US 20000000L     /* at 30% of everything 4 s were not enough,
-                                   once in ten runs, for the last piece     */
 #define SLOTS 4
 
 struct crew_node *crew_nodes;
@@ -140,10 +138,11 @@ jl_lcm *crew_join(const char *run, int which, int n, int max_len,
     return lcm;
 }
 
-void crew_leave(jl_lcm *lcm, struct crew_node *node, int failed)
+void crew_leave(jl_lcm *lcm, struct crew_node *node, int failed,
+                long linger_us)
 {
     node->count = jl_lcm_count(lcm);
-    jl_lcm_close(lcm, LINGER_US);
+    jl_lcm_close(lcm, linger_us);
     _exit(failed);
 }
 
@@ -181,7 +180,7 @@ static void live_in_filter(const char *run, int which, int sticky,
     if (status != JL_OK)
         fprintf(stderr, "%s: node %d: %s\n", run, which,
                 jl_status_text(status));
-    crew_leave(lcm, node, status != JL_OK);
+    crew_leave(lcm, node, status != JL_OK, CREW_LINGER_US);
 }
 
 void crew_start_filter(pid_t *child, const char *run, int sticky,

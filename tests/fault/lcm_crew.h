@@ -41,8 +41,11 @@ int crew_failures(const pid_t *child, int n);
 jl_lcm *crew_join(const char *run, int which, int n, int max_len,
                   jl_u32 rto_us, const fault_set *set, struct crew_node *node);
 
-/* In a child: close, note what happened, end. */
-void crew_leave(jl_lcm *lcm, struct crew_node *node, int failed);
+/* In a child: close, which waits for what is not acknowledged yet, note what
+ * happened, end. */
+void crew_leave(jl_lcm *lcm, struct crew_node *node, int failed,
+                long linger_us);
+#define CREW_LINGER_US 4000000L         /* dozens of repetitions            */
 
 /* Start a parallel filter of CREW_PES and its host: nodes[CREW_PES + 1],
  * child[CREW_PES + 1].  The host's trace is to be crew_serial's. */

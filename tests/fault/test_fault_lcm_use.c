@@ -43,7 +43,7 @@ static int run(int n, conform_body body)
 
             lcm = crew_join(name, i, n, port->max_len, RTO_US, set, node);
             body(i);
-            crew_leave(lcm, node, conform_failures() != 0);
+            crew_leave(lcm, node, conform_failures() != 0, CREW_LINGER_US);
         }
     }
     return crew_failures(child, n);
