@@ -22,7 +22,8 @@
  *
  * What it is worth (paper's scenario, `jumplink sim --scenario manoeuvre1d`):
  * positions as good as the IMM's; in the quiet phase after a manoeuvre
- * velocities are 1.17, accelerations 1.34 times as far off.  Whether a pair of modes is fit for it: jl_cg_coupling.
+ * velocities are 1.17, accelerations 1.34 times as far off.  Whether a pair of
+ * modes is fit for it: jl_cg_coupling_of.
  */
 #ifndef JL_CGIMM_H
 #define JL_CGIMM_H
@@ -133,8 +134,8 @@ typedef struct jl_cgimm {
 /* Bind a filter to its gains [M], which outlive it, and its memory: mem [cap],
  * cap >= JL_CGIMM_STATE(M, axes).  x = 0, mu uniform, gains at their start.
  * Pi [M,M], rows sum to 1.
- * Returns JL_OK, JL_EDIM (M outside 1..JL_MAX_MODES, axes outside 1..64, an
- * order), JL_ENOMEM, JL_ENONFINITE, JL_EPROB (Pi), JL_ERANGE (T or R not above
+ * Returns JL_OK, JL_EDIM (M outside 1..JL_MAX_MODES, axes outside
+ * 1..JL_MAX_STATES, an order), JL_ENOMEM, JL_ENONFINITE, JL_EPROB (Pi), JL_ERANGE (T or R not above
  * 0; gains of no stable filter: alpha not in 0..1, beta not in 0..4 - 2 alpha,
  * gamma not in 0..4 alpha beta / (2 - alpha); k not in 0..1e6); *cg is
  * untouched on error. */
@@ -206,8 +207,8 @@ typedef struct jl_cg_adaptive {
 
 /* Gains low, high [2] (jl_cg_steady), smoothing c in (0, 1], 0 <= down <= up;
  * mem [cap], cap >= JL_CG_ADAPTIVE_STATE(axes).  x = 0, level 1.
- * Returns JL_OK, JL_EDIM (axes outside 1..64), JL_ENOMEM, JL_ERANGE (gains of no
- * stable filter, or another argument); *f is untouched on error. */
+ * Returns JL_OK, JL_EDIM (axes outside 1..JL_MAX_STATES), JL_ENOMEM, JL_ERANGE (gains
+ * of no stable filter, or another argument); *f is untouched on error. */
 int jl_cg_adaptive_init(jl_cg_adaptive *f, int axes, jl_real T, jl_real R,
                         const jl_real *low, const jl_real *high, jl_real c,
                         jl_real up, jl_real down, jl_real *mem, int cap);
