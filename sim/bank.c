@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* --- open and close ------------------------------------------------------ */
+
 /* Modes may differ in their number of noises, so each has its own place. */
 static int copy_modes(struct bank *bank)
 {
@@ -68,6 +70,20 @@ static int open_imm(struct bank *bank, const struct options *options)
                        options->gate_most) == JL_OK ? 0 : -1;
 }
 
+static int open_cg(struct bank *bank)
+{
+    const struct model *model = bank->model;
+    int M = model->M, m = model->m, cap = JL_CGIMM_STATE(M, m);
+
+    bank->mem = calloc((size_t)cap, sizeof(jl_real));
+    bank->scratch = calloc((size_t)(3 * m), sizeof(jl_real));
+    bank->x = calloc((size_t)(M * model->n), sizeof(jl_real));
+    if (bank->mem == NULL || bank->scratch == NULL || bank->x == NULL)
+        return -1;
+    return jl_cgimm_init(&bank->cg, M, model->gains, m, model->T, model->R,
+                         model->Pi, bank->mem, cap) == JL_OK ? 0 : -1;
+}
+
 int bank_open(struct bank *bank, const struct model *model,
               const struct options *options)
 {
@@ -76,7 +92,8 @@ int bank_open(struct bank *bank, const struct model *model,
     bank->dt = -1;
     if (model->M < 1)
         return -1;
-    if (copy_modes(bank) != 0 || open_imm(bank, options) != 0) {
+    if (model->gains != NULL ? open_cg(bank) != 0
+        : copy_modes(bank) != 0 || open_imm(bank, options) != 0) {
         bank_close(bank);
         return -1;
     }
@@ -94,6 +111,8 @@ void bank_close(struct bank *bank)
     free(bank->P);
     memset(bank, 0, sizeof *bank);
 }
+
+/* --- kind imm ------------------------------------------------------------ */
 
 /* Every mode starts from the same first measurement; one that lacks the
  * acceleration as if it had it: then that is the prior. */
@@ -164,4 +183,73 @@ int bank_prepare(void *context, jl_imm *imm, const jl_meas *meas)
                                                  || meas->dt > bank->dt))))
         status = rebuild(bank, imm, meas->dt);
     return status;
+}
+
+/* --- kind cgimm ---------------------------------------------------------- */
+
+/* From a first measurement all modes start at rest. */
+static int start_cg(struct bank *bank, jl_cgimm *cg, const jl_real *z)
+{
+    const struct model *model = bank->model;
+    int i, n = model->n, order = n / model->m, status;
+
+    if (z == NULL)
+        return JL_EORDER;               /* the feed does not let that happen */
+    for (i = 0; i < model->M * n; i++)
+        bank->x[i] = i % order == 0 ? z[i % n / order] : 0;
+    status = jl_cgimm_set(cg, bank->x, model->mu0);
+    return status == JL_OK ? JL_STARTED : status;
+}
+
+int bank_prepare_cg(void *context, jl_cgimm *cg, const jl_meas *meas)
+{
+    struct bank *bank = context;
+    const struct model *model = bank->model;
+
+    if (!meas->first)
+        return JL_OK;
+    return model->x0 == NULL ? start_cg(bank, cg, meas->z)
+        : jl_cgimm_set(cg, model->x0, model->mu0);
+}
+
+/* --- a step -------------------------------------------------------------- */
+
+static int step_imm(struct bank *bank, jl_estimate *estimate,
+                    const jl_meas *meas)
+{
+    jl_imm *imm = &bank->imm;
+    int status = bank_prepare(bank, imm, meas);
+
+    if (status == JL_OK)
+        status = jl_imm_step(imm, meas->z, bank->scratch);
+    estimate->verdict = imm->verdict;
+    estimate->loglik = imm->loglik;
+    estimate->x = imm->xhat;
+    estimate->P = imm->Phat;
+    estimate->mu = imm->mu;
+    return status;
+}
+
+static int step_cg(struct bank *bank, jl_estimate *estimate,
+                   const jl_meas *meas)
+{
+    jl_cgimm *cg = &bank->cg;
+    int status = bank_prepare_cg(bank, cg, meas);
+
+    estimate->verdict = status == JL_OK && meas->z != NULL ? JL_ACCEPTED
+                                                           : JL_MISSING;
+    if (status == JL_OK)
+        status = jl_cgimm_step(cg, meas->z);
+    jl_cgimm_estimate(cg, bank->scratch);
+    estimate->loglik = cg->loglik;
+    estimate->x = bank->scratch;
+    estimate->P = NULL;
+    estimate->mu = cg->mu;
+    return status;
+}
+
+int bank_step(struct bank *bank, jl_estimate *estimate, const jl_meas *meas)
+{
+    return (bank->model->gains != NULL ? step_cg : step_imm)(bank, estimate,
+                                                             meas);
 }

@@ -8,7 +8,6 @@
 
 #include "complain.h"
 #include "diagnostics.h"
-#include "jumplink/kf.h"
 #include "out_file.h"
 
 /* From count to more numbers, the new ones NaN.  All NaNs have the same bits,
@@ -76,25 +75,20 @@ void estimates_close(struct estimates *e)
     memset(e, 0, sizeof *e);
 }
 
-void estimates_note(struct estimates *e, long row, const jl_real *x,
-                    const jl_real *P, const jl_real *mu, jl_real loglik,
+void estimates_note(struct estimates *e, long row, const jl_estimate *estimate,
                     double us)
 {
-    int n = e->n, M = e->M;
+    size_t n = (size_t)e->n, M = (size_t)e->M, at = (size_t)row;
 
-    memcpy(e->x + row * n, x, (size_t)n * sizeof *x);
+    memcpy(e->x + at * n, estimate->x, n * sizeof *e->x);
     if (e->has_P)
-        memcpy(e->P + row * n * n, P, (size_t)(n * n) * sizeof *P);
-    memcpy(e->mu + row * M, mu, (size_t)M * sizeof *mu);
-    e->loglik[row] = loglik;
+        memcpy(e->P + at * n * n, estimate->P, n * n * sizeof *e->P);
+    memcpy(e->mu + at * M, estimate->mu, M * sizeof *e->mu);
+    e->loglik[row] = estimate->loglik;
     e->us[row] = us;
     e->done = row + 1;
-}
-
-void estimates_judge(struct estimates *e, int verdict)
-{
-    e->judged += verdict != JL_MISSING;
-    e->rejected += verdict == JL_REJECTED;
+    e->judged += estimate->verdict != JL_MISSING;
+    e->rejected += estimate->verdict == JL_REJECTED;
 }
 
 static int same(const jl_real *a, const jl_real *b, long count)
@@ -120,6 +114,8 @@ double estimates_apart(const struct estimates *a, const struct estimates *b)
     long row;
     int i, n = b->n;
 
+    if (!b->has_P)
+        return (double)NAN;
     for (row = 0; row < b->rows; row++)
         for (i = 0; i < n; i++) {
             double x = (double)a->x[row * n + i], y = (double)b->x[row * n + i];

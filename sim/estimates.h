@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "data_file.h"
+#include "jumplink/par.h"
 #include "model_file.h"
 
 struct diagnostics;
@@ -32,20 +33,15 @@ int estimates_open(struct estimates *e, const struct data_file *data,
 int estimates_grow(struct estimates *e, long rows);
 void estimates_close(struct estimates *e);
 
-/* Take down a row: x [n], P [n,n] or NULL, mu [M], loglik, and the time it
- * took. */
-void estimates_note(struct estimates *e, long row, const jl_real *x,
-                    const jl_real *P, const jl_real *mu, jl_real loglik,
+/* Take down a row, the time it took, and, by its verdict, the measurement. */
+void estimates_note(struct estimates *e, long row, const jl_estimate *estimate,
                     double us);
-
-/* Count a measurement by its verdict (kf.h). */
-void estimates_judge(struct estimates *e, int verdict);
 
 /* 1 if all numbers of both have the same bits (times apart). */
 int estimates_same(const struct estimates *a, const struct estimates *b);
 
 /* The largest difference of a state in its sigma, sqrt(P) of b; NaN where only
- * one of them has an estimate. */
+ * one of them has an estimate, and without P. */
 double estimates_apart(const struct estimates *a, const struct estimates *b);
 
 /* Median and 99th percentile of the time per step; number of steps. */

@@ -167,6 +167,7 @@ int options_take(struct options *o, int c, char *const *argv)
         if (i < 0)
             return 2;
         o->form = form_of[i];
+        o->form_given = 1;
         return 0;
     case 1004:
         i = choose(o->command, "hold", value, holds);

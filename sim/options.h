@@ -25,6 +25,7 @@ struct options {
     enum filter filter;         /* OF_KIND: the one the model is of         */
     int mode;                   /* of FILTER_KF; -1: the only one           */
     const jl_kf_form *form;
+    int form_given;
     double gate;                /* a good measurement passes with this
                                    probability; 0: no gate                  */
     int gate_most;              /* rejections in a row; 0: not given        */

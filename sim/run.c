@@ -25,15 +25,16 @@ static int check_cgimm(const struct model *model, const struct options *o)
 {
     const char *option = o->filter == FILTER_IMM ? "--filter imm"
         : o->filter == FILTER_KF ? "--filter kf"
-        : o->form != &jl_kf_joseph ? "--form"
+        : o->form_given ? "--form"
         : o->gate > 0 ? "--gate"
         : o->diagnostics ? "--diagnostics" : NULL;
 
     if (option != NULL)
         return misuse(o->command, "%s needs covariances, and %s is of kind "
                       "cgimm", option, model->path);
-    if (o->port != PORT_NONE)
-        return misuse(o->command, "%s is of kind cgimm, which runs serially",
+    if (o->exchange == JL_EXCHANGE_REDUCE)
+        return misuse(o->command, "--exchange reduce is for kind imm, and %s "
+                      "is of kind cgimm, whose PEs need every mode's estimate",
                       model->path);
     return 0;
 }

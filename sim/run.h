@@ -17,12 +17,9 @@ struct traffic {
 
 /* Each runs the filter over all rows of the record into *e.  On failure prints
  * one line (which row, what) and returns the program's exit status, 1; what
- * was estimated before is in *e.  Otherwise returns 0.  run_serial runs a model
- * of kind cgimm by run_cgimm. */
+ * was estimated before is in *e.  Otherwise returns 0. */
 int run_serial(struct estimates *e, const struct model *model,
                const struct data_file *data, const struct options *options);
-int run_cgimm(struct estimates *e, const struct model *model,
-              const struct data_file *data, const struct options *options);
 int run_inside(struct estimates *e, struct traffic *traffic,
                const struct model *model, const struct data_file *data,
                const struct options *options);

@@ -104,12 +104,9 @@ static int host_row(struct estimates *e, long row,
         status = JL_EMSG;
     if (status == JL_OK)
         status = estimate->status;
-    if (status == JL_OK) {
-        estimates_note(e, row, estimate->x, estimate->P, estimate->mu,
-                       estimate->loglik,
+    if (status == JL_OK)
+        estimates_note(e, row, estimate,
                        is_start ? (double)NAN : clock_us() - before);
-        estimates_judge(e, estimate->verdict);
-    }
     return status;
 }
 
@@ -206,8 +203,8 @@ int run_host(struct estimates *e, long *row, struct run_host *host,
     }
     memset(&estimate, 0, sizeof estimate);
     estimate.x = mem;
-    estimate.P = mem + n;
-    estimate.mu = estimate.P + n * n;
+    estimate.mu = mem + n;
+    estimate.P = model->gains != NULL ? NULL : estimate.mu + model->M;
     status = receive(host, NULL, model, options, buf, cap);
     if (status == JL_OK) {
         typed_open(&typed, model, data, options);

@@ -74,8 +74,10 @@ static void become_pe(int pe, const char *url, const char *run,
         argv[n++] = "--exchange";
         argv[n++] = "reduce";
     }
-    argv[n++] = "--form";
-    argv[n++] = options_form(options);
+    if (options->form_given) {
+        argv[n++] = "--form";
+        argv[n++] = options_form(options);
+    }
     if (options->filter == FILTER_KF) {
         argv[n++] = "--filter";
         argv[n++] = "kf";

@@ -11,7 +11,8 @@
 
 int run_max_len(const struct model *model)
 {
-    return JL_PAR_MSG(model->M, model->n, model->m);
+    return model->gains != NULL ? JL_PAR_CG_MSG(model->M, model->m)
+        : JL_PAR_MSG(model->M, model->n, model->m);
 }
 
 long run_message_us(const struct options *options)
@@ -67,7 +68,7 @@ static void pe_failed(int pe, const jl_par *par, int status)
 int run_pe(int pe, const struct model *model, const struct options *options,
            jl_chan **to, jl_chan **from)
 {
-    int M = model->M, cap = JL_PAR_BUF(M, model->n, model->m), status;
+    int M = model->M, cap = 2 * run_max_len(model), status;
     unsigned char *owner = calloc((size_t)M, 1);
     unsigned char *buf = malloc((size_t)cap);
     int *mode_status = calloc((size_t)M, sizeof *mode_status);
@@ -93,12 +94,14 @@ int run_pe(int pe, const struct model *model, const struct options *options,
         config.to_host = to[options->pes];
         config.from_host = from[options->pes];
         config.prepare = bank_prepare;
+        config.prepare_cg = bank_prepare_cg;
         config.context = &bank;
         config.fingerprint = run_fingerprint(model, options);
         config.start_us = options->start_us;
         config.timeout_us = run_message_us(options);
-        status = jl_par_init(&par, &bank.imm, &config, buf, cap, mode_status,
-                             z);
+        status = model->gains != NULL
+            ? jl_par_init_cg(&par, &bank.cg, &config, buf, cap, mode_status, z)
+            : jl_par_init(&par, &bank.imm, &config, buf, cap, mode_status, z);
         if (status == JL_OK)
             status = jl_par_serve(&par, bank.scratch);
         if (status != JL_OK)

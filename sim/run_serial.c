@@ -15,12 +15,10 @@ int run_serial(struct estimates *e, const struct model *model,
 {
     struct bank bank;
     struct feed feed;
-    jl_imm *imm = &bank.imm;
+    jl_estimate estimate;
     long row;
     int status = JL_OK;
 
-    if (model->gains != NULL)
-        return run_cgimm(e, model, data, options);
     if (feed_open(&feed, data, model, options) != 0)
         return 2;
     if (bank_open(&bank, model, options) != 0) {
@@ -34,16 +32,13 @@ int run_serial(struct estimates *e, const struct model *model,
         if (!feed_meas(&feed, row, &meas))
             continue;
         before = clock_us();
-        status = bank_prepare(&bank, imm, &meas);
-        if (status == JL_OK)
-            status = jl_imm_step(imm, meas.z, bank.scratch);
+        status = bank_step(&bank, &estimate, &meas);
         if (status == JL_OK || status == JL_STARTED) {
-            estimates_note(e, row, imm->xhat, imm->Phat, imm->mu, imm->loglik,
+            estimates_note(e, row, &estimate,
                            status == JL_OK ? clock_us() - before
                                            : (double)NAN);
-            estimates_judge(e, imm->verdict);
             if (e->diagnostics != NULL)
-                diagnostics_note(e->diagnostics, row, imm);
+                diagnostics_note(e->diagnostics, row, &bank.imm);
         }
         if (status == JL_STARTED)
             status = JL_OK;

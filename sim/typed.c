@@ -92,13 +92,13 @@ void typed_estimate(struct typed *t, long row, const jl_estimate *answer)
     message.status = answer->status;
     message.loglik = n > 0 ? (double)answer->loglik : 0;
     message.n = n;
-    message.n_P = JL_PACKED(n);
+    message.n_P = answer->P != NULL ? JL_PACKED(n) : 0;
     message.M = n > 0 ? t->M : 0;
     message.x = to;
     for (i = 0; i < n; i++)
         *to++ = (double)answer->x[i];
     message.P = to;
-    for (i = 0; i < n; i++)
+    for (i = 0; i < n && message.n_P > 0; i++)
         for (j = i; j < n; j++)
             *to++ = (double)answer->P[i * n + j];
     message.mu = to;
