@@ -28,7 +28,7 @@ static const char help[] =
     "                    sim/data/carrier_held_1hz.csv)\n"
     "  --model FILE      a model; may be given several times (default, in\n"
     "                    the source folder: sim/data/two_modes.json and\n"
-    "                    eight_modes.json)\n"
+    "                    eight_modes.json; of kind cgimm two_gains.json)\n"
     "  -o, --out DIR     where results go (default build/sim)\n"
     "  --port lcm|threads|loop  processes over LCM (default), or threads,\n"
     "                    or threads that take turns\n"
@@ -203,6 +203,8 @@ static int live(const char *data, const char *const *models, int count,
 static int recorded(const char *data, const char *const *models, int count,
                     struct options *options, long idle_us)
 {
+    static const char *const gains[] = { "sim/data/two_gains.json" };
+
     if (idle_us > 0)
         return misuse("sim", "--idle goes with --input lcm");
     if (options->port != PORT_LCM && options->lcm_url != NULL)
@@ -211,6 +213,8 @@ static int recorded(const char *data, const char *const *models, int count,
         return misuse("sim", "--run names what is published on --lcm-url");
     if (data == NULL)
         data = "sim/data/carrier_held_1hz.csv";
+    if (count == 0 && options->filter == FILTER_CGIMM)
+        return sim(data, gains, 1, options);
     return sim(data, models, count == 0 ? 2 : count, options);
 }
 

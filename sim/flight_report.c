@@ -15,7 +15,7 @@
 
 int flight_fits(const struct model *model)
 {
-    if (model->motions != NULL && model->motions[0].axes == 2)
+    if ((model->motions != NULL || model->gains != NULL) && model->m == 2)
         return 0;
     return complain(model->path, 0, "axes", "a flight needs motions in 2 axes");
 }
@@ -150,6 +150,17 @@ static int write_track(const struct flight_report *r, const char *folder)
 
 #define HEAD "%-12s %-10s %8s %6s %8s %8s %7s %8s %6s %s%s\n"
 
+/* The form of those filters that have one. */
+static const char *form_name(const struct flight_report *r)
+{
+    int i;
+
+    for (i = 0; i < r->count; i++)
+        if (r->runs[i].e.has_P)
+            return options_form(r->options);
+    return "constant gains";
+}
+
 static void print_table(const struct flight_report *r, FILE *out)
 {
     int i;
@@ -160,7 +171,7 @@ static void print_table(const struct flight_report *r, FILE *out)
                 : options_port_name(r->options->port),
             options_topology(r->options),
             r->options->exchange == JL_EXCHANGE_REDUCE ? ", all-reduce" : "",
-            options_form(r->options),
+            form_name(r),
             JL_REAL_FLOAT ? "float" : "double");
     if (r->options->gate > 0)
         fprintf(out, ", gate %.17g", r->options->gate);
@@ -179,8 +190,8 @@ static void print_table(const struct flight_report *r, FILE *out)
 
         if (r->options->gate > 0)
             snprintf(rejected, sizeof rejected, "%8ld ", run->e.rejected);
-        snprintf(same, sizeof same, run->same ? "yes" : "NO, %.1e sigma",
-                 run->apart);
+        snprintf(same, sizeof same, run->same ? "yes"
+                 : run->e.has_P ? "NO, %.1e sigma" : "NO", run->apart);
         fprintf(out, "%-12s %-10s %8.2f %6ld %8.1f %8.1f %7.1f %8lu %6lu "
                 "%s%s\n", run->model, run->positions,
                 rms_error(run, r->data), steps, median, p99, run->serial_us,
@@ -269,6 +280,29 @@ static int plot_model(const struct flight_report *r, int first, int count,
                        1 + count);
 }
 
+/* Of constant gains alpha tells two of one order apart. */
+static void mode_label(char *label, size_t size, const struct model *model,
+                       int j)
+{
+    const jl_motion *motion;
+
+    if (model->gains != NULL) {
+        snprintf(label, size, "order %d, alpha %.3g", model->gains[j].order,
+                 (double)model->gains[j].steady[0]);
+        return;
+    }
+    motion = &model->motions[j];
+    if (motion->kind == JL_MOTION_CT)
+        snprintf(label, size, "CT %+g rad/s", (double)motion->turn_rate);
+    else if (motion->kind == JL_MOTION_SINGER)
+        snprintf(label, size, "Singer %g m/s^2, %g s",
+                 (double)motion->accel_std, (double)motion->tau_s);
+    else
+        snprintf(label, size, "%s %g m/s^2",
+                 motion->kind == JL_MOTION_CV ? "CV" : "CA",
+                 (double)motion->accel_std);
+}
+
 static int plot_run_modes(const struct flight_report *r,
                           const struct flight_run *run, const char *folder)
 {
@@ -278,18 +312,7 @@ static int plot_run_modes(const struct flight_report *r,
     int j, M = run->source->M;
 
     for (j = 0; j < M && j < MOST; j++) {
-        const jl_motion *motion = &run->source->motions[j];
-
-        if (motion->kind == JL_MOTION_CT)
-            snprintf(label[j], sizeof label[j], "CT %+g rad/s",
-                     (double)motion->turn_rate);
-        else if (motion->kind == JL_MOTION_SINGER)
-            snprintf(label[j], sizeof label[j], "Singer %g m/s^2, %g s",
-                     (double)motion->accel_std, (double)motion->tau_s);
-        else
-            snprintf(label[j], sizeof label[j], "%s %g m/s^2",
-                     motion->kind == JL_MOTION_CV ? "CV" : "CA",
-                     (double)motion->accel_std);
+        mode_label(label[j], sizeof label[j], run->source, j);
         names[j] = label[j];
     }
     snprintf(file, sizeof file, "%s.csv", run->name);

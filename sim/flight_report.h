@@ -15,7 +15,8 @@ struct flight_run {
     struct estimates e;
     struct traffic traffic;
     int same;                   /* the serial filter's bits                 */
-    double apart;               /* ... or so many sigmas from them at most  */
+    double apart;               /* ... or so many sigmas from them at most;
+                                   NaN without covariances                  */
     int partial;                /* the run failed: what is here is a start  */
     double serial_us;           /* median step of the serial filter         */
 };

@@ -1,7 +1,8 @@
 /* Models of kind cgimm: gains instead of covariances.
  *
  * At the top T, R, Pi, mu0, modes, and axes (default 1).  A mode has its start
- * x0 [n], n = axes times the largest order, axis by axis, and its gains: w0,
+ * x0 [n], n = axes times the largest order, axis by axis (or none has: then all
+ * start at the first measurement, at rest), and its gains: w0,
  * winf, kc (alpha, beta and, with order 3, gamma / 2), or none of them, and
  * then they follow from its order and the top's Q.  n, m, Phi say nothing new,
  * and must agree. */
@@ -147,9 +148,15 @@ static int check_Phi(const struct model *model, const struct json_at *mode,
 
 static int take_x0(struct model *model, const struct json_at *mode, int i)
 {
-    int n = model->n, step = n / model->m, a;
-    jl_real *x = model->x0 + i * n;
+    int n = model->n, step = n / model->m, a, here = json_has(mode, "x0");
+    jl_real *x;
 
+    if (here != (model->x0 != NULL))
+        return json_wrong(mode, "x0", "%s modes[0]: all modes have one, or "
+                          "none", here ? "not in" : "missing, but in");
+    if (!here)
+        return 0;
+    x = model->x0 + i * n;
     if (json_take_vector(x, mode, "x0", n, JL_LARGE) != 0)
         return -1;
     for (a = 2; a < n; a += step)
@@ -232,7 +239,7 @@ static int try_filter(const struct model *model, const struct json_at *top)
         return model_no_memory(top);
     status = jl_cgimm_init(&cg, model->M, model->gains, model->m, model->T,
                            model->R, model->Pi, mem, cap);
-    if (status == JL_OK)
+    if (status == JL_OK && model->x0 != NULL)
         status = jl_cgimm_set(&cg, model->x0, NULL);
     free(mem);
     return status == JL_OK ? 0
@@ -244,6 +251,7 @@ int model_read_cgimm(struct model *model, const struct json_at *top)
     static const char *const keys[] = {
         "kind", "n", "m", "axes", "T", "R", "Q", "Pi", "mu0", "modes", NULL
     };
+    struct json_at first;
     int i, M = model->M;
 
     model->gains = calloc((size_t)M, sizeof *model->gains);
@@ -252,10 +260,11 @@ int model_read_cgimm(struct model *model, const struct json_at *top)
     if (json_only(top, keys) != 0
         || model_take_above_0(&model->T, top, "T", 0) != 0
         || model_take_above_0(&model->R, top, "R", 0) != 0
-        || take_sizes(model, top) != 0)
+        || take_sizes(model, top) != 0
+        || json_entry(&first, top, "modes", 0) != 0)
         return -1;
-    model->x0 = model_reals(M, model->n, 1);
-    if (model->x0 == NULL)
+    if (json_has(&first, "x0")
+        && (model->x0 = model_reals(M, model->n, 1)) == NULL)
         return model_no_memory(top);
     for (i = 0; i < M; i++)
         if (read_mode(model, top, i) != 0)

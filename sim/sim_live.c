@@ -89,9 +89,11 @@ static void print_report(const struct estimates *e, const struct estimates *one,
            "%.1f us\n", steps, median, p99, serial);
     if (same)
         puts("same bits as serial: yes");
-    else
+    else if (e->has_P)
         printf("same bits as serial: NO, %.1e sigma\n",
                estimates_apart(e, one));
+    else
+        puts("same bits as serial: NO");
 }
 
 static int nothing_came(const struct live_input *live,
