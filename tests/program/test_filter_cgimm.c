@@ -236,6 +236,10 @@ static void test_filter_cgimm_bad_models(void **state)
         { "\"order\": 2,", "", "modes[0].order: missing" },
         { "\"order\": 2", "\"order\": 4", "modes[0].order: must be a whole" },
         { "-3, 4, 0]", "-3, 4]", "modes[0].x0: must have 6 numbers" },
+        { "\"x0\": [1, 2, 0, -3, 4, 0]", "\"note\": \"\"",
+          "modes[1].x0: not in modes[0]" },
+        { "\"x0\": [1, 2, 3, -3, 4, 1], ", "",
+          "modes[1].x0: missing, but in modes[0]" },
         { "-3, 4, 0]", "-3, 4, 5]", "modes[0].x0[5]: 5, but a mode of order" },
         { "\"name\"", "\"P0\": [], \"name\"", "modes[1].P0: unknown key" },
         { "\"name\"", "\"w0\": [1, 1, 1], \"name\"", "modes[1].winf: missing" },
@@ -283,11 +287,6 @@ static void test_filter_cgimm_refuses_what_it_cannot(void **state)
     check_refused(&ran, 2, "--diagnostics needs covariances");
     run_jumplink("filter", model, data, "--mode", "0");
     check_refused(&ran, 2, "--mode goes with --filter kf");
-    run_jumplink("filter", model, data, "--port", "loop");
-    check_refused(&ran, 2, "designed.json|runs serially");
-    run_jumplink("pe", "--pe", "0", "--pes", "1", "--model", model,
-                 "--lcm-url", "udpm://239.255.76.67:7667?ttl=0");
-    check_refused(&ran, 2, "designed.json|runs serially");
     run_jumplink("filter", TOP_DIR "/sim/data/two_modes.json", data,
                  "--filter", "cgimm");
     check_refused(&ran, 2, "two_modes.json|of kind imm");
