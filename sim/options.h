@@ -91,8 +91,10 @@ struct options {
     "acceleration is 0 +- a0_std.  Or modes by matrices: Phi, Gamma, Q, H,\n" \
     "R, and n, m, Pi, mu0 at the top; x0, P0 in each mode or at the top.\n" \
     "Or kind cgimm, constant gains: T, R, Pi, mu0, axes (default 1) at the\n" \
-    "top; modes with x0 and gains w0, winf, kc, or with x0, an order and a\n" \
-    "Q for each at the top, which make the gains.  A row is a step of T.\n\n"
+    "top; modes with gains w0, winf, kc, or with an order and a Q for each\n" \
+    "at the top, which make the gains; x0 in all of them, or in none: then\n" \
+    "it is the first measurement, at rest.  A row is a step of T.  Without\n" \
+    "covariances: no --form, --gate, --diagnostics, --exchange reduce.\n\n"
 #define DATA_HELP \
     "  --hold HOW        which measurements count as lost: none; detect:\n" \
     "                    those that repeat the row before exactly; column:\n" \
