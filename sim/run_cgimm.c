@@ -32,7 +32,7 @@ static int run_rows(struct estimates *e, jl_cgimm *cg, jl_real *x,
             double after = clock_us();
 
             jl_cgimm_estimate(cg, x);
-            estimates_note(e, row, x, NULL, cg->mu, cg->loglik,
+            estimates_note(e, row, x, NULL, cg->mu, jl_cgimm_loglik(cg),
                            after - before);
             if (options->live == NULL && interrupted() != NULL)
                 status = RUN_INTERRUPTED;
