@@ -246,12 +246,17 @@ $(BUILD)/bench/bench_sizes: $(patsubst %,$(BUILD)/native/tests/bench/%.o,bench_s
     $(BUILD)/obj/tests/bench/bench_samples.o $(BUILD)/libsim.a $(BUILD)/native/libjumplink.a
 	@mkdir -p $(@D); echo '  $@'; $(CXX) $(CFLAGS) -pthread $^ $(LIBS) -o $@
 
+$(BUILD)/bench/instructions: $(patsubst %,$(BUILD)/obj/tests/bench/%.o,instructions bench_samples) \
+    $(BUILD)/libsim.a $(BUILD)/libjumplink.a
+	@mkdir -p $(@D); echo '  $@'; $(CC) $(CFLAGS) $^ $(LIBS) -o $@
+
 bench: deps
 	@CC='$(CC)' sh tests/check/deps.sh bench
 	$(AGAIN) run-bench
 
-run-bench: $(BENCHES) $(BUILD)/bench/bench_sizes
-	@for b in $^; do $$b $(BUILD)/bench || exit 1; done
+run-bench: $(BENCHES) $(BUILD)/bench/bench_sizes $(BUILD)/bench/instructions
+	@for b in $(BENCHES) $(BUILD)/bench/bench_sizes; do $$b $(BUILD)/bench || exit 1; done
+	@sh tests/bench/instructions.sh $(BUILD)/bench/instructions $(BUILD)/bench/instructions.csv
 	@cd $(BUILD)/bench && gnuplot '$(CURDIR)/tests/bench/latency.gp' '$(CURDIR)/tests/bench/break_even.gp'
 	@echo 'CSV and plots: $(BUILD)/bench'
 

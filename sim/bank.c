@@ -241,7 +241,7 @@ static int step_cg(struct bank *bank, jl_estimate *estimate,
     if (status == JL_OK)
         status = jl_cgimm_step(cg, meas->z);
     jl_cgimm_estimate(cg, bank->scratch);
-    estimate->loglik = cg->loglik;
+    estimate->loglik = jl_cgimm_loglik(cg);
     estimate->x = bank->scratch;
     estimate->P = NULL;
     estimate->mu = cg->mu;

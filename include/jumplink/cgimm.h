@@ -14,7 +14,8 @@
  *              mu_t = c_t exp(l_t) / sum of them
  *     combine  xhat = sum_t mu_t x_t
  * S = R / (1 - alpha) is exact for the gains of a Kalman filter.  A c_t below
- * JL_REAL_MIN is 0: a mode that is entered from no other may be lost for good.
+ * 2^-54 JL_REAL_MIN may count as 0: a mode that is entered from no other may
+ * be lost for good.
  *
  * Two modes of order 2 and 3 with steady gains, one axis: 24 multiplications
  * and divisions, 27 additions, an exponential (tests/count), where the paper
@@ -100,34 +101,40 @@ int jl_cg_coupling_of(jl_cg_coupling *c, const jl_cg_gains *i,
 
 /* Reals of state. */
 #define JL_CGIMM_STATE(M, axes) \
-    ((M) * (M) + (M) * (6 * (axes) + 16) + 6 * (axes))
+    ((M) * (M) + (M) * (6 * (axes) + 17) + 6 * (axes))
 
 typedef struct jl_cgimm {
     int M, axes;
     int order;                  /* the largest of the modes                 */
-    jl_real T, R;
+    jl_real T, R, h;            /* h = -1 / 2 R                             */
     const jl_cg_gains *gains;   /* [M]                                      */
     int stage;                  /* what may come next; see the calls        */
 
     jl_real *mu;                /* [M]                                      */
-    jl_real loglik;             /* of the last measurement; 0: there was none */
 
     /* For each mode; states are scaled, p, v T, a T^2 / 2, [axes,3]. */
     jl_real *x;                 /* [M,axes,3]                               */
-    jl_real *mixed;             /* [M,axes,3] mixed, then filtered, then x  */
+    jl_real *mixed;             /* [M,axes,3] mixed and predicted (the position
+                                   less base), then filtered, then x        */
     jl_real *xhat;              /* [axes,3]                                 */
     jl_real *w;                 /* [M,3] present gains, gamma / 4           */
     jl_real *goal;              /* [M,3] steady ones                        */
     jl_real *rate;              /* [M,3] 1 - exp(-1/k)                      */
-    jl_real *g;                 /* [M]   -1 / 2 S                           */
+    jl_real *keep;              /* [M]   1 - alpha                          */
     jl_real *q;                 /* [M]   axes log(1 / 2 pi S) / 2           */
     jl_real q_more;             /* of two modes, q_0 - q_1                  */
-    jl_real *c;                 /* [M]   predicted probabilities            */
-    jl_real *l;                 /* [M]   the axes' sum of nu^2; weighed: g
-                                         times it                           */
+    jl_real *weight;            /* [M]   mu times a number of 2^54 to 2^64  */
+    jl_real all, all_before, all_left;  /* sums of weights: after and before the
+                                   last measurement, as kept for the next   */
+    int best;                   /* likeliest mode there; -1: no measurement */
+    jl_real best_sum;           /* its l                                    */
+    jl_real *c;                 /* [M]   predicted weights                  */
+    jl_real *l;                 /* [M]   the axes' sum of (1 - alpha) nu^2  */
     jl_real *moving;            /* [M]   0: gains are what they will be     */
     jl_real *e;                 /* [M]   work                               */
-    jl_real *d;                 /* [axes,3] of two modes, x_0 - x_1         */
+    jl_real *d;                 /* [axes,3] of orders 2 and 3 (else 0): of
+                                   d = x_0 - x_1 d_p + d_v T, d_v T; and base,
+                                   p_1 + v_1 T                              */
     jl_real *Pi;                /* [M,M]                                    */
 } jl_cgimm;
 
@@ -176,6 +183,10 @@ void jl_cgimm_combine(jl_cgimm *cg);
 
 /* The combined state x [axes,order], as jl_cgimm_set has it. */
 void jl_cgimm_estimate(const jl_cgimm *cg, jl_real *x);
+
+/* log p(z | what was measured before) of the last step, 0 without a
+ * measurement: a logarithm, for who wants it. */
+jl_real jl_cgimm_loglik(const jl_cgimm *cg);
 
 /* --- a baseline ---------------------------------------------------------- */
 

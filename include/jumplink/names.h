@@ -88,6 +88,7 @@
 #define jl_cgimm_weigh jl_cgimm_weigh_f32
 #define jl_cgimm_combine jl_cgimm_combine_f32
 #define jl_cgimm_estimate jl_cgimm_estimate_f32
+#define jl_cgimm_loglik jl_cgimm_loglik_f32
 #define jl_cg_adaptive_init jl_cg_adaptive_init_f32
 #define jl_cg_adaptive_set jl_cg_adaptive_set_f32
 #define jl_cg_adaptive_step jl_cg_adaptive_step_f32

@@ -1,5 +1,5 @@
 /* The adaptive alpha-beta filter that the constant-gain IMM is compared with. */
-#include "cgimm/cg_gains.h"
+#include "cgimm/cg_parts.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* Whether modes decouple: norms of their steady covariances. */
-#include "cgimm/cg_gains.h"
+#include "cgimm/cg_parts.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /* Gains of alpha-beta and alpha-beta-gamma filters: steady ones by the tracking
  * index (Kalata 1984, IEEE Trans. AES 20, 174), and on the way there. */
-#include "cgimm/cg_gains.h"
+#include "cgimm/cg_parts.h"
 
 #include <string.h>
 

@@ -1,12 +1,8 @@
-/* A step of the constant-gain IMM.
+/* A step of the constant-gain IMM, of any modes; cg_pair.c has the usual two.
  *
- * Of two modes differences are formed once, d = x_0 - x_1, for three uses:
- * xhat = x_1 + mu_0 d, and in the next step x0_t = x_1 + mu_0t d.  A state that
- * only one mode has is that mode's share of it.
- *
- * Modes are mixed and filtered in `mixed`; weigh, which cannot fail, makes that
- * the state, and the gains used the present ones. */
-#include "cgimm/cg_two.h"
+ * Modes are mixed, predicted and filtered in `mixed`; weigh, which cannot fail,
+ * makes that the state, and the gains used the present ones. */
+#include "cgimm/cg_parts.h"
 
 #include <string.h>
 
@@ -14,49 +10,12 @@
 
 #define LOG_2PI JL_C(1.8378770664093454836)
 
-/* How many components the two have in common, and who has the third. */
-static int in_common(const jl_cgimm *cg)
-{
-    int a = cg->gains[0].order, b = cg->gains[1].order;
-
-    return a < b ? a : b;
-}
-
 static int is_pair(const jl_cgimm *cg)
 {
     return cg->M == 2 && cg->gains[0].order == 2 && cg->gains[1].order == 3;
 }
 
 /* --- mix ----------------------------------------------------------------- */
-
-/* x = x_1 + share d, and of a component that only mode `owner` has
- * part x_owner. */
-static void between(jl_real *x, const jl_cgimm *cg, jl_real share,
-                    int components, jl_real part, int owner)
-{
-    const jl_real *x1 = cg->x + 3 * cg->axes, *own = cg->x, *d = cg->d;
-    int a, i, common = in_common(cg);
-
-    if (owner == 1)
-        own = x1;
-    for (a = 0; a < cg->axes; a++, x += 3, x1 += 3, own += 3, d += 3) {
-        for (i = 0; i < common; i++)
-            x[i] = x1[i] + share * d[i];
-        if (components > common)
-            x[2] = part * own[2];
-    }
-}
-
-/* e[t] is the share of mode 0 in mode t's mixture. */
-static void foresee_two(jl_cgimm *cg)
-{
-    struct jli_two c, share = jli_foresee_two(&c, cg->Pi, cg->mu);
-
-    cg->c[0] = c.of_0;
-    cg->c[1] = c.of_1;
-    cg->e[0] = share.of_0;
-    cg->e[1] = share.of_1;
-}
 
 /* e[t] is 1 / c_t, or 0 if the mode cannot be entered. */
 static void foresee_all(jl_cgimm *cg)
@@ -67,7 +26,7 @@ static void foresee_all(jl_cgimm *cg)
         jl_real c = 0;
 
         for (s = 0; s < M; s++)
-            c += cg->Pi[s * M + t] * cg->mu[s];
+            c += cg->Pi[s * M + t] * cg->weight[s];
         cg->c[t] = c >= JL_REAL_MIN ? c : 0;
         cg->e[t] = c >= JL_REAL_MIN ? 1 / c : 0;
     }
@@ -75,20 +34,11 @@ static void foresee_all(jl_cgimm *cg)
 
 void jl_cgimm_foresee(jl_cgimm *cg)
 {
-    if (cg->M == 2)
-        foresee_two(cg);
+    if (is_pair(cg))
+        jli_pair_foresee(cg);
     else
         foresee_all(cg);
     cg->stage = JLI_CG_MIXED;
-}
-
-static void mix_two(jl_cgimm *cg, int t)
-{
-    int owner = cg->gains[0].order < cg->gains[1].order;
-
-    /* of a component that mode t alone has, what comes from itself */
-    between(cg->mixed + t * 3 * cg->axes, cg, cg->e[t], cg->gains[t].order,
-            t == 0 ? cg->e[t] : 1 - cg->e[t], owner);
 }
 
 static void mix_all(jl_cgimm *cg, int t)
@@ -102,7 +52,7 @@ static void mix_all(jl_cgimm *cg, int t)
     }
     memset(x, 0, (size_t)state * sizeof *x);
     for (s = 0; s < M; s++) {
-        const jl_real share = cg->Pi[s * M + t] * cg->mu[s] * cg->e[t];
+        const jl_real share = cg->Pi[s * M + t] * cg->weight[s] * cg->e[t];
         const jl_real *xs = cg->x + s * state;
 
         for (a = 0; a < state; a += 3)
@@ -111,13 +61,29 @@ static void mix_all(jl_cgimm *cg, int t)
     }
 }
 
+/* x- = F x0 in place: p + v T + a T^2 / 2, v T + a T^2. */
+static void predict(jl_cgimm *cg, int t)
+{
+    jl_real *x = cg->mixed + t * 3 * cg->axes;
+    int a;
+
+    for (a = 0; a < cg->axes; a++, x += 3) {
+        jl_real half = x[1] + x[2];     /* v half way, times T */
+
+        x[0] += half;
+        x[1] = half + x[2];
+    }
+}
+
 void jl_cgimm_mix_mode(jl_cgimm *cg, int j)
 {
     JL_ASSERT(j >= 0 && j < cg->M);
-    if (cg->M == 2)
-        mix_two(cg, j);
-    else
+    if (is_pair(cg)) {
+        jli_pair_mix(cg, j);
+    } else {
         mix_all(cg, j);
+        predict(cg, j);
+    }
 }
 
 /* --- gains --------------------------------------------------------------- */
@@ -143,51 +109,37 @@ static int next_gains(jl_real *w, const jl_cgimm *cg, int j)
 
 static void advance(jl_cgimm *cg, int j)
 {
-    jl_real rest;
-
     cg->moving[j] = (jl_real)next_gains(cg->w + 3 * j, cg, j);
-    rest = 1 - cg->w[3 * j];
-    cg->g[j] = -rest / (2 * cg->R);
-    cg->q[j] = (jl_real)cg->axes * (jl_log(rest / cg->R) - LOG_2PI) / 2;
+    cg->keep[j] = 1 - cg->w[3 * j];
+    cg->q[j] = (jl_real)cg->axes * (jl_log(cg->keep[j] / cg->R) - LOG_2PI) / 2;
     if (cg->M == 2)
         cg->q_more = cg->q[0] - cg->q[1];
 }
 
 /* --- filter -------------------------------------------------------------- */
 
-/* x- = F x0 in place: p + v T + a T^2 / 2, v T + a T^2. */
-static void predict(jl_real *x, int order)
-{
-    if (order == 3) {
-        jl_real half = x[1] + x[2];     /* v half way, times T */
-
-        x[0] += half;
-        x[1] = half + x[2];
-    } else {
-        x[0] += x[1];
-    }
-}
-
 static void filter(jl_cgimm *cg, int j, const jl_real *z)
 {
-    int order = cg->gains[j].order, a, i;
-    jl_real *x = cg->mixed + j * 3 * cg->axes, next[3], sum = 0;
-    const jl_real *w = cg->w + 3 * j;
+    const int order = cg->gains[j].order;
+    const jl_real *w = cg->w + 3 * j, *d = cg->d;
+    jl_real *x = cg->mixed + j * 3 * cg->axes;
+    jl_real keep = cg->keep[j], next[3], sum = 0;
+    int a;
 
     if (z != NULL && cg->moving[j] > 0) {
         (void)next_gains(next, cg, j);
         w = next;
+        keep = 1 - next[0];
     }
-    for (a = 0; a < cg->axes; a++, x += 3) {
-        jl_real nu;
+    for (a = 0; a < cg->axes; a++, x += 3, d += 3) {
+        jl_real square;
 
-        predict(x, order);
-        if (z == NULL)
+        if (z == NULL) {
+            x[0] += d[2];
             continue;
-        nu = z[a] - x[0];
-        for (i = 0; i < order; i++)
-            x[i] += w[i] * nu;
-        sum = a == 0 ? nu * nu : sum + nu * nu;
+        }
+        square = jli_cg_correct(x, order, d[2], z[a], w, keep);
+        sum = a == 0 ? square : sum + square;
     }
     cg->l[j] = sum;
     cg->stage = JLI_CG_FILTERED;
@@ -211,49 +163,51 @@ int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z)
 
 /* --- weigh --------------------------------------------------------------- */
 
-static void weigh_two(jl_cgimm *cg)
-{
-    struct jli_two c, l;
-
-    c.of_0 = cg->c[0];
-    c.of_1 = cg->c[1];
-    l.of_0 = cg->l[0];
-    l.of_1 = cg->l[1];
-    jli_weigh_two(cg, c, l);
-}
-
 static void weigh_all(jl_cgimm *cg)
 {
-    int j, M = cg->M;
-    jl_real best = -JL_REAL_MAX, sum = 0, r;
+    int j, M = cg->M, best = -1;
+    jl_real all = 0, r;
 
-    for (j = 0; j < M; j++)
-        if (cg->c[j] > 0 && cg->q[j] + cg->l[j] > best)
-            best = cg->q[j] + cg->l[j];
     for (j = 0; j < M; j++) {
-        cg->mu[j] = cg->c[j] > 0
-            ? cg->c[j] * jl_exp(cg->q[j] + cg->l[j] - best) : 0;
-        sum += cg->mu[j];
+        cg->e[j] = cg->q[j] + jli_cg_loglik(cg, cg->l[j]);
+        if (cg->c[j] > 0 && (best < 0 || cg->e[j] > cg->e[best]))
+            best = j;
     }
-    r = 1 / sum;
+    for (j = 0; j < M; j++) {
+        cg->weight[j] = cg->c[j] > 0
+            ? cg->c[j] * jl_exp(cg->e[j] - cg->e[best]) : 0;
+        all += cg->weight[j];
+    }
+    r = 1 / all;
     for (j = 0; j < M; j++)
-        cg->mu[j] *= r;
-    cg->loglik = best + jl_log(sum);
+        cg->mu[j] = cg->weight[j] * r;
+    jli_cg_weighed(cg, all, best, cg->l[best]);
 }
 
 static void weigh(jl_cgimm *cg)
 {
     int j;
 
-    for (j = 0; j < cg->M; j++) {
+    for (j = 0; j < cg->M; j++)
         if (cg->moving[j] > 0)
             advance(cg, j);
-        cg->l[j] = jli_cg_bounded(cg->g[j] * cg->l[j]);
-    }
-    if (cg->M == 2)
-        weigh_two(cg);
+    if (is_pair(cg))
+        jli_pair_weigh(cg);
     else
         weigh_all(cg);
+}
+
+/* Without a measurement. */
+static void keep_weights(jl_cgimm *cg)
+{
+    int j;
+    jl_real all = 0;
+
+    for (j = 0; j < cg->M; j++)
+        all += cg->c[j];
+    for (j = 0; j < cg->M; j++)
+        cg->mu[j] = (cg->weight[j] = cg->c[j]) / all;
+    jli_cg_unweighed(cg, all);
 }
 
 int jl_cgimm_weigh(jl_cgimm *cg, const jl_real *z)
@@ -262,31 +216,25 @@ int jl_cgimm_weigh(jl_cgimm *cg, const jl_real *z)
 
     if (cg->stage != JLI_CG_FILTERED)
         return JL_EORDER;
-    if (z != NULL) {
+    if (z != NULL)
         weigh(cg);
-    } else {
-        memcpy(cg->mu, cg->c, (size_t)cg->M * sizeof *cg->mu);
-        cg->loglik = 0;
-    }
+    else
+        keep_weights(cg);
     cg->x = cg->mixed;
     cg->mixed = x;
     cg->stage = JLI_CG_IDLE;
     return JL_OK;
 }
 
-/* --- combine ------------------------------------------------------------- */
-
-static void combine_two(jl_cgimm *cg)
+jl_real jl_cgimm_loglik(const jl_cgimm *cg)
 {
-    const jl_real *x0 = cg->x, *x1 = x0 + 3 * cg->axes;
-    int owner = cg->gains[0].order < cg->gains[1].order;
-    int common = in_common(cg), a, i;
-
-    for (a = 0; a < cg->axes; a++)
-        for (i = 0; i < common; i++)
-            cg->d[3 * a + i] = x0[3 * a + i] - x1[3 * a + i];
-    between(cg->xhat, cg, cg->mu[0], cg->order, cg->mu[owner], owner);
+    if (cg->best < 0)
+        return 0;
+    return cg->q[cg->best] + jli_cg_loglik(cg, cg->best_sum)
+        + jl_log(cg->all / cg->all_before);
 }
+
+/* --- combine ------------------------------------------------------------- */
 
 void jl_cgimm_combine(jl_cgimm *cg)
 {
@@ -294,10 +242,6 @@ void jl_cgimm_combine(jl_cgimm *cg)
 
     if (is_pair(cg)) {
         jli_pair_combine(cg);
-        return;
-    }
-    if (cg->M == 2) {
-        combine_two(cg);
         return;
     }
     memset(cg->xhat, 0, (size_t)state * sizeof *cg->xhat);

@@ -1,5 +1,5 @@
 /* The constant-gain IMM as an object. */
-#include "cgimm/cg_gains.h"
+#include "cgimm/cg_parts.h"
 
 #include <string.h>
 
@@ -18,14 +18,15 @@ static void layout(jl_cgimm *cg, jl_real *mem)
     cg->w = cg->d + state;
     cg->goal = cg->w + 3 * M;
     cg->rate = cg->goal + 3 * M;
-    cg->g = cg->rate + 3 * M;
-    cg->q = cg->g + M;
+    cg->keep = cg->rate + 3 * M;
+    cg->q = cg->keep + M;
     cg->c = cg->q + M;
     cg->l = cg->c + M;
     cg->moving = cg->l + M;
     cg->e = cg->moving + M;
     cg->mu = cg->e + M;
-    cg->Pi = cg->mu + M;
+    cg->weight = cg->mu + M;
+    cg->Pi = cg->weight + M;
 }
 
 static void set_goal(jl_cgimm *cg, int j)
@@ -46,9 +47,10 @@ static void start(jl_cgimm *cg, const jl_real *mu)
 
     for (j = 0; j < M; j++) {
         cg->mu[j] = mu != NULL ? mu[j] : 1 / (jl_real)M;
+        cg->weight[j] = JLI_WEIGHTS * cg->mu[j];
         jl_cgimm_restart(cg, j);
     }
-    cg->loglik = 0;
+    jli_cg_unweighed(cg, JLI_WEIGHTS);
     jl_cgimm_combine(cg);
 }
 
@@ -102,6 +104,7 @@ int jl_cgimm_init(jl_cgimm *cg, int M, const jl_cg_gains *gains, int axes,
     cg->order = order;
     cg->T = T;
     cg->R = R;
+    cg->h = -1 / (2 * R);
     cg->gains = gains;
     layout(cg, mem);
     memcpy(cg->Pi, Pi, (size_t)(M * M) * sizeof *Pi);

@@ -2,7 +2,7 @@
  * squared, and its state; all else every PE has. */
 #include "par/par_parts.h"
 
-#include "cgimm/cg_gains.h"
+#include "cgimm/cg_parts.h"
 
 static jl_real largest(const jl_par *par)
 {
@@ -100,7 +100,7 @@ static void answer(const jl_par *par, jl_estimate *estimate, jl_real *scratch)
     const jl_cgimm *cg = par->cg;
 
     jl_cgimm_estimate(cg, scratch);
-    estimate->loglik = cg->loglik;
+    estimate->loglik = jl_cgimm_loglik(cg);
     estimate->x = scratch;
     estimate->mu = cg->mu;
 }

@@ -45,8 +45,9 @@ typedef struct sizes_filter *sizes_make(const struct sizes_model *model,
 sizes_make sizes_fixed, sizes_dense, sizes_any, sizes_plain, sizes_eigen;
 
 /* The constant-gain IMM of modes CV and CA in one axis, gains steady: the Q of
- * a mode is W[1][1], T = 1; it has no P. */
-sizes_make sizes_constant_gain;
+ * a mode is W[1][1], T = 1; it has no P, and the log-likelihood if asked. */
+struct sizes_filter *sizes_constant_gain(const struct sizes_model *model,
+                                         int loglik);
 
 #ifdef __cplusplus
 }

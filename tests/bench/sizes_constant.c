@@ -34,7 +34,13 @@ static jl_real step(struct sizes_filter *f, const jl_real *z)
     struct constant_filter *c = of(f);
 
     bench_must(jl_cgimm_step(&c->cg, z) == JL_OK, "jl_cgimm_step");
-    return c->cg.loglik;
+    return c->cg.mu[0];
+}
+
+static jl_real step_and_loglik(struct sizes_filter *f, const jl_real *z)
+{
+    (void)step(f, z);
+    return jl_cgimm_loglik(&of(f)->cg);
 }
 
 static struct sizes_estimate estimate(struct sizes_filter *f)
@@ -47,16 +53,15 @@ static struct sizes_estimate estimate(struct sizes_filter *f)
 }
 
 struct sizes_filter *sizes_constant_gain(const struct sizes_model *model,
-                                         enum sizes_form form)
+                                         int loglik)
 {
     struct constant_filter *c = calloc(1, sizeof *c);
     int j;
 
-    (void)form;
     bench_must(c != NULL && model->M == 2 && model->n == 3 && model->m == 1,
                "a constant-gain IMM");
     c->base.start = start;
-    c->base.step = step;
+    c->base.step = loglik ? step_and_loglik : step;
     c->base.estimate = estimate;
     c->model = model;
     for (j = 0; j < 2; j++) {

@@ -15,6 +15,7 @@ test      g++                        g++
 test      nftables                   /usr/sbin/nft
 test      iproute2                   ip
 bench     g++                        g++
+bench     valgrind                   valgrind
 bench     libeigen3-dev              c++:eigen3/Eigen/Dense
 fuzz      clang                      clang
 fuzz      libclang-rt-14-dev         clang:fuzzer

@@ -303,7 +303,7 @@ static inline void par_serial_cg(struct par_trace *trace,
         status = par_cg_step(&bank, &meas, &verdict);
         jl_cgimm_estimate(&bank.cg, x);
         par_note(trace, k, status, verdict, x, NULL, bank.cg.mu,
-                 bank.cg.loglik, shape->M, shape->axes * bank.cg.order);
+                 jl_cgimm_loglik(&bank.cg), shape->M, shape->axes * bank.cg.order);
     }
 }
 

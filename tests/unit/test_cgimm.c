@@ -20,7 +20,7 @@
 
 /* Below it a foreseen probability is 0; above it none may vanish, but for
  * float, where e^l already does at l = -104. */
-#define LEAST ((real)JL_REAL_MIN)
+#define LEAST ((real)JL_REAL_MIN / (1LL << 54))
 
 typedef long double real;
 
@@ -223,7 +223,7 @@ static void check(const struct rig *r, const struct setting *s)
         sum += r->cg.mu[j];
     }
     assert_close(sum, 1, 8 * EPS);
-    assert_close(((double)r->cg.loglik - (double)b->loglik)
+    assert_close(((double)jl_cgimm_loglik(&r->cg) - (double)b->loglik)
                  / (1 + fabs((double)b->loglik)), 0, NEAR);
 }
 
@@ -357,7 +357,8 @@ static void test_cgimm_two_modes_are_two_of_three(void **state)
         for (i = 0; i < 2; i++)
             assert_close(rig.cg.mu[i], more.cg.mu[i], NEAR);
         assert_close(more.cg.mu[2], 0, 0);
-        assert_close(rig.cg.loglik, more.cg.loglik, NEAR);
+        assert_close(jl_cgimm_loglik(&rig.cg),
+                     jl_cgimm_loglik(&more.cg), NEAR);
     }
 }
 
@@ -396,8 +397,8 @@ static void test_cgimm_step_is_its_stages(void **state)
                                  (size_t)s.M * sizeof(jl_real));
                 assert_same_bits(rig.cg.xhat, other.cg.xhat,
                                  (size_t)(s.axes * 3) * sizeof(jl_real));
-                assert_same_bits(&rig.cg.loglik, &other.cg.loglik,
-                                 sizeof(jl_real));
+                assert_true(jl_cgimm_loglik(&rig.cg)
+                            == jl_cgimm_loglik(&other.cg));
             }
         }
 }
@@ -429,7 +430,7 @@ static void test_cgimm_survives_outliers(void **state)
                 jl_cgimm_estimate(&rig.cg, x);
                 for (i = 0; i < 2 * rig.cg.order; i++)
                     assert_true(isfinite((double)x[i]));
-                assert_true(isfinite((double)rig.cg.loglik));
+                assert_true(isfinite((double)jl_cgimm_loglik(&rig.cg)));
                 for (i = 0; i < s.M; i++) {
                     assert_true(rig.cg.mu[i] >= 0);
                     sum += rig.cg.mu[i];
