@@ -109,8 +109,8 @@ int jl_par_init_cg(jl_par *par, jl_cgimm *cg, const jl_par_config *config,
                    unsigned char *buf, int cap, int *status, jl_real *z)
 {
     static const struct jl_par_kind kind = {
-        largest, prepare, ahead, update, commit, word, read_word, reals, put,
-        get, answer
+        JLI_CG_MODES, largest, prepare, ahead, update, commit, word, read_word,
+        reals, put, get, answer
     };
     int bound;
 

@@ -155,8 +155,8 @@ int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
                 unsigned char *buf, int cap, int *status, jl_real *z)
 {
     static const struct jl_par_kind kind = {
-        largest, prepare, ahead, update, commit, word, read_word, reals, put,
-        get, answer
+        JLI_MODES, largest, prepare, ahead, update, commit, word, read_word,
+        reals, put, get, answer
     };
     int bound = jli_par_bind(par, imm->M, imm->n, imm->m,
                              JL_PAR_MSG(imm->M, imm->n, imm->m), config, buf,

@@ -18,6 +18,8 @@
 
 /* What the parallel filter must know of a kind of filter; j is a mode. */
 struct jl_par_kind {
+    int modes;                  /* the type of its MODES */
+
     /* The largest magnitude a measurement may have. */
     jl_real (*largest)(const jl_par *par);
 

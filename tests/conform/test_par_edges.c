@@ -105,6 +105,51 @@ static void test_par_cg_messages_are_as_short_as_said(void **state)
         }
 }
 
+/* A mode of an IMM of 3 states has as many reals as one of order 3 in 3 axes,
+ * an estimate as many as one of 9 states without covariance. */
+static void test_par_kinds_take_only_their_own(void **state)
+{
+    static const unsigned char owner[3] = { 0, 1, 0 };
+    static struct par_cg_bank bank;
+    unsigned char buf[JL_PAR_CG_BUF(3, 3)], msg[JL_PAR_CG_MSG(3, 3)];
+    jl_real x[9] = { 0 }, P[9] = { 0 }, mu[2] = { 0 }, z[3];
+    jl_estimate imm = { 0 }, cg = { 0 };
+    jl_par_config config = { 0 };
+    jl_hop hop = { 0 };
+    int status[3] = { 0 }, len;
+    jl_chan chan = { 0 }, *chans[2];
+    jl_par par;
+
+    (void)state;
+    chan.max_len = JL_PAR_CG_MSG(3, 3);
+    chans[0] = chans[1] = &chan;
+    config.npe = 2;
+    config.pe = 1;
+    config.owner = owner;
+    config.to = config.from = chans;
+    hop.first = hop.from = 1;
+    hop.count = 1;
+    par_cg_init(&bank, 3, 3);
+    assert_int_equal(bank.gains[1].order, 3);
+    assert_int_equal(jl_par_init_cg(&par, &bank.cg, &config, buf, sizeof buf,
+                                    status, z), JL_OK);
+    len = jli_msg_modes(msg, &par, &hop);
+    assert_int_equal(len, 8 + JL_PAR_MODE(3));
+    assert_int_equal(jli_msg_modes_read(&par, &hop, msg, len), JL_OK);
+    msg[0] = JLI_MODES;
+    assert_int_equal(jli_msg_modes_read(&par, &hop, msg, len), JL_EMSG);
+
+    imm.x = cg.x = x;
+    imm.mu = cg.mu = mu;
+    imm.P = P;
+    len = jli_msg_estimate(msg, &imm, 2, 3);
+    assert_int_equal(jli_msg_estimate_read(&imm, 2, 3, msg, len), JL_OK);
+    assert_int_equal(jli_msg_estimate_read(&cg, 2, 9, msg, len), JL_EMSG);
+    assert_int_equal(jli_msg_estimate(msg, &cg, 2, 9), len);
+    assert_int_equal(jli_msg_estimate_read(&cg, 2, 9, msg, len), JL_OK);
+    assert_int_equal(jli_msg_estimate_read(&imm, 2, 3, msg, len), JL_EMSG);
+}
+
 /* --- pools --------------------------------------------------------------- */
 
 #define MODES 3
@@ -153,6 +198,7 @@ int main(void)
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_deadlines_grow_and_stay_numbers),
         cmocka_unit_test(test_par_cg_messages_are_as_short_as_said),
+        cmocka_unit_test(test_par_kinds_take_only_their_own),
         cmocka_unit_test(test_pool_heeds_only_modes_that_are_possible),
     };
 

@@ -745,6 +745,7 @@ static void test_par_believes_no_odd_pe(void **state)
         { 0, 4, 8, 0, JL_EMODEL },      /* fingerprint */
         { 0, -1, 0, 1, JL_EMSG },
         { 1, 0, 9, 0, JL_EMSG },        /* type */
+        { 1, 0, 7, 0, JL_EMSG },        /* of a constant-gain IMM */
         { 1, 1, 0, 0, JL_EMSG },        /* from PE0 */
         { 1, 2, 2, 0, JL_EMSG },        /* two modes */
         { 1, 4, 2, 0, JL_EMSG },        /* of another measurement */
