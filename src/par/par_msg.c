@@ -108,6 +108,19 @@ int jli_msg_modes(unsigned char *buf, const jl_par *par, const jl_hop *hop)
     return (int)(p - buf);
 }
 
+/* Where one has failed, the others' pool may be anything, and nobody uses it. */
+static int are_sound(const jl_par *par, const jl_hop *hop)
+{
+    int j, sound = 1, failed = 0;
+
+    for (j = 0; j < par->M; j++)
+        if (carried(par, hop, j)) {
+            failed |= par->status[j] != JL_OK;
+            sound &= par->kind->is_sound(par, j);
+        }
+    return sound || failed;
+}
+
 int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
                        const unsigned char *buf, int len)
 {
@@ -136,7 +149,7 @@ int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
     for (j = 0; j < par->M; j++)
         if (carried(par, hop, j))
             buf = par->kind->get(buf, par, j);
-    return JL_OK;
+    return are_sound(par, hop) ? JL_OK : JL_EMSG;
 }
 
 /* --- estimate ------------------------------------------------------------ */

@@ -67,7 +67,8 @@ int jli_msg_plain(unsigned char *buf, int type, int octet, int number,
                   jl_u32 word);
 
 /* Each writes a message to buf, large enough, and returns its length; each
- * _read returns JL_OK, JL_EMSG (another type, other modes) or JL_ELENGTH. */
+ * _read returns JL_OK, JL_EMSG (another type, other modes, a mode that has not
+ * failed with numbers that are not finite) or JL_ELENGTH. */
 int jli_msg_meas(unsigned char *buf, const jl_meas *meas, int m);
 int jli_msg_meas_read(jl_meas *meas, jl_real *z, int m,
                       const unsigned char *buf, int len);

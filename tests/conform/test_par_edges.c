@@ -105,39 +105,76 @@ static void test_par_cg_messages_are_as_short_as_said(void **state)
         }
 }
 
-/* A mode of an IMM of 3 states has as many reals as one of order 3 in 3 axes,
- * an estimate as many as one of 9 states without covariance. */
-static void test_par_kinds_take_only_their_own(void **state)
+/* Binds *par of *bank, which is PE 1 of 2 and owns mode 1. */
+static void bind(jl_par *par, struct par_cg_bank *bank)
 {
-    static const unsigned char owner[3] = { 0, 1, 0 };
-    static struct par_cg_bank bank;
-    unsigned char buf[JL_PAR_CG_BUF(3, 3)], msg[JL_PAR_CG_MSG(3, 3)];
-    jl_real x[9] = { 0 }, P[9] = { 0 }, mu[2] = { 0 }, z[3];
-    jl_estimate imm = { 0 }, cg = { 0 };
+    static unsigned char owner[3] = { 0, 1, 0 }, buf[JL_PAR_CG_BUF(3, 3)];
+    static int status[3];
+    static jl_real z[3];
+    static jl_chan chan, *chans[2] = { &chan, &chan };
     jl_par_config config = { 0 };
-    jl_hop hop = { 0 };
-    int status[3] = { 0 }, len;
-    jl_chan chan = { 0 }, *chans[2];
-    jl_par par;
 
-    (void)state;
     chan.max_len = JL_PAR_CG_MSG(3, 3);
-    chans[0] = chans[1] = &chan;
     config.npe = 2;
     config.pe = 1;
     config.owner = owner;
     config.to = config.from = chans;
-    hop.first = hop.from = 1;
-    hop.count = 1;
-    par_cg_init(&bank, 3, 3);
-    assert_int_equal(bank.gains[1].order, 3);
-    assert_int_equal(jl_par_init_cg(&par, &bank.cg, &config, buf, sizeof buf,
+    par_cg_init(bank, 3, 3);
+    assert_int_equal(bank->gains[1].order, 3);
+    memset(status, 0, sizeof status);
+    assert_int_equal(jl_par_init_cg(par, &bank->cg, &config, buf, sizeof buf,
                                     status, z), JL_OK);
-    len = jli_msg_modes(msg, &par, &hop);
+}
+
+static const jl_hop of_mode_1 = { .from = 1, .first = 1, .count = 1 };
+
+/* Of a mode that has not failed: no number that is none, no square below 0. */
+static void test_par_cg_takes_no_unsound_mode(void **state)
+{
+    static struct par_cg_bank bank;
+    unsigned char msg[JL_PAR_CG_MSG(3, 3)];
+    const jl_real bad[] = { -1, jl_log(0), -jl_log(0), jl_log(0) * 0 };
+    jl_real good = 1;
+    int len, at, k;
+    jl_par par;
+
+    (void)state;
+    bind(&par, &bank);
+    len = jli_msg_modes(msg, &par, &of_mode_1);
+    for (at = 10; at < len; at += JL_REAL_OCTETS)
+        for (k = 0; k < 4; k++) {
+            int sound = at == 10 ? k == 2 : k == 0;
+
+            jl_put_reals(msg + at, &bad[k], 1);
+            assert_int_equal(jli_msg_modes_read(&par, &of_mode_1, msg, len),
+                             sound ? JL_OK : JL_EMSG);
+            jl_put_u16(msg + 8, (unsigned)-JL_ENONFINITE);
+            assert_int_equal(jli_msg_modes_read(&par, &of_mode_1, msg, len),
+                             JL_OK);
+            jl_put_u16(msg + 8, 0);
+            jl_put_reals(msg + at, &good, 1);
+        }
+    assert_int_equal(at, len);
+}
+
+/* A mode of an IMM of 3 states has as many reals as one of order 3 in 3 axes,
+ * an estimate as many as one of 9 states without covariance. */
+static void test_par_kinds_take_only_their_own(void **state)
+{
+    static struct par_cg_bank bank;
+    unsigned char msg[JL_PAR_CG_MSG(3, 3)];
+    jl_real x[9] = { 0 }, P[9] = { 0 }, mu[2] = { 0 };
+    jl_estimate imm = { 0 }, cg = { 0 };
+    int len;
+    jl_par par;
+
+    (void)state;
+    bind(&par, &bank);
+    len = jli_msg_modes(msg, &par, &of_mode_1);
     assert_int_equal(len, 8 + JL_PAR_MODE(3));
-    assert_int_equal(jli_msg_modes_read(&par, &hop, msg, len), JL_OK);
+    assert_int_equal(jli_msg_modes_read(&par, &of_mode_1, msg, len), JL_OK);
     msg[0] = JLI_MODES;
-    assert_int_equal(jli_msg_modes_read(&par, &hop, msg, len), JL_EMSG);
+    assert_int_equal(jli_msg_modes_read(&par, &of_mode_1, msg, len), JL_EMSG);
 
     imm.x = cg.x = x;
     imm.mu = cg.mu = mu;
@@ -198,6 +235,7 @@ int main(void)
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_deadlines_grow_and_stay_numbers),
         cmocka_unit_test(test_par_cg_messages_are_as_short_as_said),
+        cmocka_unit_test(test_par_cg_takes_no_unsound_mode),
         cmocka_unit_test(test_par_kinds_take_only_their_own),
         cmocka_unit_test(test_pool_heeds_only_modes_that_are_possible),
     };
