@@ -187,6 +187,57 @@ static void test_par_kinds_take_only_their_own(void **state)
     assert_int_equal(jli_msg_estimate_read(&imm, 2, 3, msg, len), JL_EMSG);
 }
 
+/* The largest filter there may be, orders mixed: one message that carries all
+ * modes fits, and brings the bits of all that a mode has, but no more. */
+static void test_par_cg_largest_messages_fit(void **state)
+{
+    enum { M = JL_MAX_MODES, AXES = JL_MAX_STATES, X = M * AXES * 3 };
+    static jl_cg_gains gains[M];
+    static jl_real mem[2][JL_CGIMM_STATE(M, AXES)], Pi[M * M], z[AXES];
+    static unsigned char buf[JL_PAR_CG_BUF(M, AXES)], owner[M];
+    static unsigned char msg[JL_PAR_CG_MSG(M, AXES)];
+    static int status[M];
+    jl_par_config config = { 0 };
+    jl_hop hop = { .count = 1 };
+    int i, j, len, want = 8;
+    jl_estimate estimate = { 0 };
+    jl_cgimm cg[2];
+    jl_par par[2];
+
+    (void)state;
+    config.npe = 1;
+    config.owner = owner;
+    for (j = 0; j < M; j++) {
+        assert_int_equal(jl_cg_design(&gains[j], j % 3 == 1 ? 2 : 3, 1, 100,
+                                      1e4), JL_OK);
+        want += 2 + (1 + AXES * gains[j].order) * JL_REAL_OCTETS;
+        Pi[j * M + j] = 1;
+    }
+    for (i = 0; i < 2; i++) {
+        assert_int_equal(jl_cgimm_init(&cg[i], M, gains, AXES, 1, 1e4, Pi,
+                                       mem[i], JL_CGIMM_STATE(M, AXES)),
+                         JL_OK);
+        assert_int_equal(jl_par_init_cg(&par[i], &cg[i], &config, buf,
+                                        sizeof buf, status, z), JL_OK);
+    }
+    for (i = 0; i < X; i++)
+        cg[0].mixed[i] = (jl_real)(i + 1);
+    for (j = 0; j < M; j++)
+        cg[0].l[j] = (jl_real)j;
+    len = jli_msg_modes(msg, &par[0], &hop);
+    assert_int_equal(len, want);
+    assert_in_range(len, 1, JL_PAR_CG_MSG(M, AXES));
+    assert_int_equal(jli_msg_modes_read(&par[1], &hop, msg, len), JL_OK);
+    for (i = 0; i < X; i++)
+        assert_close(cg[1].mixed[i],
+                     i % 3 < gains[i / (3 * AXES)].order ? i + 1 : 0, 0);
+    assert_same_bits(cg[1].l, cg[0].l, M * sizeof *z);
+    estimate.x = cg[0].mixed;
+    estimate.mu = cg[0].mu;
+    assert_in_range(jli_msg_estimate(msg, &estimate, M, AXES * 3), 1,
+                    JL_PAR_CG_MSG(M, AXES));
+}
+
 /* --- pools --------------------------------------------------------------- */
 
 #define MODES 3
@@ -237,6 +288,7 @@ int main(void)
         cmocka_unit_test(test_par_cg_messages_are_as_short_as_said),
         cmocka_unit_test(test_par_cg_takes_no_unsound_mode),
         cmocka_unit_test(test_par_kinds_take_only_their_own),
+        cmocka_unit_test(test_par_cg_largest_messages_fit),
         cmocka_unit_test(test_pool_heeds_only_modes_that_are_possible),
     };
 
