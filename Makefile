@@ -165,7 +165,7 @@ $(BUILD)/obj_f32/tests/%.o: tests/%.c $(BUILD)/flags | golden generated
 # words for several numbers at once, which are of the machine's own types.
 COUNTED := $(patsubst %.c,$(BUILD)/count/%.o,$(wildcard $(patsubst %,src/%/*.c,mat model kf imm cgimm)))
 COUNTING = $(CXX) -std=c++11 -Wall -Wextra -Wno-missing-field-initializers -U__SSE2__ -U__ARM_NEON \
-    $(EXACT) '-DJL_REAL_FILE="count/counted.hh"' -Iinclude -Isrc -Itests $(CFLAGS) -MMD -MP
+    $(EXACT) '-DJL_REAL_FILE="count/counted.hh"' -Iinclude -Isrc -Itests -Isim $(CFLAGS) -MMD -MP
 TESTS += $(BUILD)/tests/test_count
 $(BUILD)/count/%.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D); echo '  $@'; $(COUNTING) -x c++ -c $< -o $@

@@ -30,6 +30,14 @@ extern const struct man_phase man_phases[MAN_PHASES];
 /* Standard deviation of a measured position [m]. */
 #define MAN_SIGMA 100.0
 
+/* A step's multiplications and divisions, and additions, as tests/count counts
+ * and asserts them: with steady gains, but for the log-likelihood; the IMM in
+ * standard form. */
+enum {
+    MAN_CG_PRODUCTS = 24, MAN_CG_SUMS = 27,
+    MAN_IMM_PRODUCTS = 291, MAN_IMM_SUMS = 292
+};
+
 /* A figure and its standard error over the runs. */
 struct man_figure {
     double value, error;

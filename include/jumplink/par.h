@@ -14,7 +14,7 @@
  * (Pan, Dai, Zhang 1997, sections 3-6, with their three exchanges made one.)
  *
  * A constant-gain IMM (cgimm.h) is spread likewise, with the bits of
- * jl_cgimm_step; its exchange has (status, nu^2, x_j) of a mode: in double, of
+ * jl_cgimm_step; its exchange has (status, l_j, x_j) of a mode: in double, of
  * one axis, 2 + 8 (order + 1) octets, and 8 for the message.  Two PEs with a
  * mode of order 2 and one of 3 send 34 and 42 octets a step, where an IMM of 3
  * states sends twice 90.

@@ -114,23 +114,30 @@ int jl_cgimm_init(jl_cgimm *cg, int M, const jl_cg_gains *gains, int axes,
     return JL_OK;
 }
 
+/* An axis of a mode as the filter keeps it. */
+static void scaled(jl_real *s, const jl_real *x, int order, jl_real T)
+{
+    s[0] = x[0];
+    s[1] = x[1] * T;
+    s[2] = order == 3 ? x[2] * T * T / 2 : 0;
+}
+
 int jl_cgimm_set(jl_cgimm *cg, const jl_real *x, const jl_real *mu)
 {
-    int M = cg->M, axes = cg->axes, order = cg->order, j, a, status;
+    int M = cg->M, axes = cg->axes, order = cg->order, j, a, i, status;
+    jl_real s[3], *to = cg->x;
 
-    if (!jl_vec_within(x, M * axes * order, JL_LARGE))
-        return JL_ENONFINITE;
+    for (i = 0; i < M * axes * order; i += order) {
+        scaled(s, x + i, order, cg->T);
+        if (!jl_vec_within(x + i, order, JL_LARGE) || !jl_vec_within(s, 3, JL_LARGE))
+            return JL_ENONFINITE;
+    }
     status = jl_chain_check(NULL, mu, M);
     if (status != JL_OK)
         return status;
     for (j = 0; j < M; j++)
-        for (a = 0; a < axes; a++, x += order) {
-            jl_real *s = cg->x + (j * axes + a) * 3;
-
-            s[0] = x[0];
-            s[1] = x[1] * cg->T;
-            s[2] = cg->gains[j].order == 3 ? x[2] * cg->T * cg->T / 2 : 0;
-        }
+        for (a = 0; a < axes; a++, x += order, to += 3)
+            scaled(to, x, cg->gains[j].order, cg->T);
     start(cg, mu);
     return JL_OK;
 }

@@ -130,10 +130,9 @@ static int answer(jl_par *par, jl_u32 seq, int status, jl_real *scratch)
     memset(&estimate, 0, sizeof estimate);
     estimate.seq = seq;
     estimate.status = status;
-    if (status == JL_OK) {
+    if (status == JL_OK)
         estimate.verdict = par->verdict;
-        par->kind->answer(par, &estimate, scratch);
-    }
+    par->kind->answer(par, &estimate, scratch);
     len = jli_msg_estimate(JLI_OUT(par), &estimate, par->M, par->n);
     return jli_par_send(par, par->config.npe, JLI_OUT(par), len,
                         par->config.timeout_us, 0);

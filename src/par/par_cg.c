@@ -1,8 +1,9 @@
-/* The constant-gain IMM, distributed: the message of a mode is its innovation,
- * squared, and its state; all else every PE has. */
+/* The constant-gain IMM, distributed: the message of a mode is its l, of
+ * nu^2, and its state; all else every PE has. */
 #include "par/par_parts.h"
 
 #include "cgimm/cg_parts.h"
+#include "jumplink/mat.h"
 
 static jl_real largest(const jl_par *par)
 {
@@ -32,6 +33,25 @@ static void ahead(jl_par *par, jl_real *scratch)
             jl_cgimm_mix_mode(cg, j);
 }
 
+/* As in a message; the sum of nu^2 may have overflowed. */
+static int is_sound(const jl_par *par, int j)
+{
+    const jl_cgimm *cg = par->cg;
+    int a, sound = cg->l[j] >= 0;
+
+    for (a = 0; a < cg->axes; a++)
+        sound &= jl_vec_within(cg->mixed + (j * cg->axes + a) * 3,
+                               cg->gains[j].order, JL_REAL_MAX);
+    return sound;
+}
+
+static int filter_mode(const jl_par *par, int j, const jl_real *z)
+{
+    int status = jl_cgimm_filter_mode(par->cg, j, z);
+
+    return status == JL_OK && !is_sound(par, j) ? JL_ENONFINITE : status;
+}
+
 static void update(jl_par *par, const jl_real *z, jl_real *scratch)
 {
     int j;
@@ -39,7 +59,7 @@ static void update(jl_par *par, const jl_real *z, jl_real *scratch)
     (void)scratch;
     for (j = 0; j < par->M; j++)
         if (JLI_OWNS(par, j))
-            par->status[j] = jl_cgimm_filter_mode(par->cg, j, z);
+            par->status[j] = filter_mode(par, j, z);
 }
 
 /* On every PE: the next mixing uses what combine computes. */
@@ -109,8 +129,8 @@ int jl_par_init_cg(jl_par *par, jl_cgimm *cg, const jl_par_config *config,
                    unsigned char *buf, int cap, int *status, jl_real *z)
 {
     static const struct jl_par_kind kind = {
-        largest, prepare, ahead, update, commit, word, read_word, reals, put,
-        get, answer
+        JLI_CG_MODES, largest, prepare, ahead, update, commit, word, read_word,
+        reals, put, get, is_sound, answer
     };
     int bound;
 

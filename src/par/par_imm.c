@@ -2,6 +2,7 @@
 #include "par/par_parts.h"
 
 #include "imm/imm_stage.h"
+#include "jumplink/mat.h"
 
 static int reduces(const jl_par *par)
 {
@@ -140,6 +141,18 @@ static const unsigned char *get(const unsigned char *p, jl_par *par, int j)
     return jli_get_upper(p, imm->Pw + j * n * n, imm->form->cov->factored, n);
 }
 
+/* l is -infinite where a mode cannot use what its gate rejects. */
+static int is_sound(const jl_par *par, int j)
+{
+    const jl_imm *imm = par->imm;
+    int n = imm->n;
+
+    return imm->l[j] <= JL_REAL_MAX
+        && (!has_estimate(par, j)
+            || (jl_vec_within(imm->xw + j * n, n, JL_REAL_MAX)
+                && jl_vec_within(imm->Pw + j * n * n, n * n, JL_REAL_MAX)));
+}
+
 static void answer(const jl_par *par, jl_estimate *estimate, jl_real *scratch)
 {
     const jl_imm *imm = par->imm;
@@ -155,8 +168,8 @@ int jl_par_init(jl_par *par, jl_imm *imm, const jl_par_config *config,
                 unsigned char *buf, int cap, int *status, jl_real *z)
 {
     static const struct jl_par_kind kind = {
-        largest, prepare, ahead, update, commit, word, read_word, reals, put,
-        get, answer
+        JLI_MODES, largest, prepare, ahead, update, commit, word, read_word,
+        reals, put, get, is_sound, answer
     };
     int bound = jli_par_bind(par, imm->M, imm->n, imm->m,
                              JL_PAR_MSG(imm->M, imm->n, imm->m), config, buf,

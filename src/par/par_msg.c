@@ -92,8 +92,8 @@ int jli_msg_modes(unsigned char *buf, const jl_par *par, const jl_hop *hop)
     unsigned char *p = buf;
     int j;
 
-    p += jli_msg_plain(buf, JLI_MODES, par->config.pe, count_modes(par, hop),
-                       par->seq);
+    p += jli_msg_plain(buf, par->kind->modes, par->config.pe,
+                       count_modes(par, hop), par->seq);
     for (j = 0; j < par->M; j++)
         if (carried(par, hop, j)) {
             jl_put_u16(p, par->kind->word(par, j));
@@ -108,6 +108,19 @@ int jli_msg_modes(unsigned char *buf, const jl_par *par, const jl_hop *hop)
     return (int)(p - buf);
 }
 
+/* Where one has failed, the others' pool may be anything, and nobody uses it. */
+static int are_sound(const jl_par *par, const jl_hop *hop)
+{
+    int j, sound = 1, failed = 0;
+
+    for (j = 0; j < par->M; j++)
+        if (carried(par, hop, j)) {
+            failed |= par->status[j] != JL_OK;
+            sound &= par->kind->is_sound(par, j);
+        }
+    return sound || failed;
+}
+
 int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
                        const unsigned char *buf, int len)
 {
@@ -115,7 +128,7 @@ int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
 
     if (len < JLI_MSG_HEADER)
         return JL_ELENGTH;
-    if (buf[0] != JLI_MODES || buf[1] != hop->from
+    if (buf[0] != par->kind->modes || buf[1] != hop->from
         || (int)jl_get_u16(buf + 2) != count_modes(par, hop)
         || jl_get_u32(buf + 4) != par->seq)
         return JL_EMSG;
@@ -136,17 +149,22 @@ int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
     for (j = 0; j < par->M; j++)
         if (carried(par, hop, j))
             buf = par->kind->get(buf, par, j);
-    return JL_OK;
+    return are_sound(par, hop) ? JL_OK : JL_EMSG;
 }
 
 /* --- estimate ------------------------------------------------------------ */
+
+static int type_of(const jl_estimate *estimate)
+{
+    return estimate->P != NULL ? JLI_ESTIMATE : JLI_CG_ESTIMATE;
+}
 
 int jli_msg_estimate(unsigned char *buf, const jl_estimate *estimate, int M,
                      int n)
 {
     unsigned char *p = buf;
 
-    p += jli_msg_plain(buf, JLI_ESTIMATE, estimate->verdict,
+    p += jli_msg_plain(buf, type_of(estimate), estimate->verdict,
                        -estimate->status, estimate->seq);
     if (estimate->status == JL_OK) {
         p = jl_put_reals(p, &estimate->loglik, 1);
@@ -166,7 +184,7 @@ int jli_msg_estimate_read(jl_estimate *estimate, int M, int n,
     if (len < JLI_MSG_HEADER)
         return JL_ELENGTH;
     status = -(int)jl_get_u16(buf + 2);
-    if (buf[0] != JLI_ESTIMATE
+    if (buf[0] != type_of(estimate)
         || buf[1] > (status == JL_OK ? JL_REJECTED : 0))
         return JL_EMSG;
     if (len != JLI_MSG_HEADER

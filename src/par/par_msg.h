@@ -12,6 +12,7 @@
  *                                                nothing if status is not 0
  *     STOP       -      -           -
  *     FAULT      culprit  -status   -
+ *     CG_MODES, CG_ESTIMATE         of a constant-gain IMM (below)
  *
  * What is marked - is 0.  READY bears the PE that its numbers are of: a PE
  * passes on those that differ from its own.  MODES lists, in index order, the
@@ -22,9 +23,9 @@
  * (x, P) are predicted only.  The verdict is 0 if the status is not.  FAULT
  * names the PE (npe: the host) that cannot be gone on with.
  *
- * A constant-gain IMM has no P, and in MODES the axes' sum of nu^2 in the place
+ * A constant-gain IMM has no P, and in MODES the axes' sum of (1 - alpha) nu^2 in the place
  * of l, and x as it keeps it: axis by axis p, v T and, of order 3, a T^2 / 2.
- * That all run the same kind of filter is for the fingerprint to say.
+ * Types of its own, for an IMM's message may have the same length.
  */
 #ifndef JL_PAR_MSG_H
 #define JL_PAR_MSG_H
@@ -56,7 +57,7 @@
 
 enum {
     JLI_READY = 1, JLI_MEAS = 2, JLI_MODES = 3, JLI_ESTIMATE = 4, JLI_STOP = 5,
-    JLI_FAULT = 6
+    JLI_FAULT = 6, JLI_CG_MODES = 7, JLI_CG_ESTIMATE = 8
 };
 
 #define JLI_MSG_HEADER 8
@@ -66,7 +67,8 @@ int jli_msg_plain(unsigned char *buf, int type, int octet, int number,
                   jl_u32 word);
 
 /* Each writes a message to buf, large enough, and returns its length; each
- * _read returns JL_OK, JL_EMSG (another type, other modes) or JL_ELENGTH. */
+ * _read returns JL_OK, JL_EMSG (another type, other modes, a mode that has not
+ * failed with numbers that are not finite) or JL_ELENGTH. */
 int jli_msg_meas(unsigned char *buf, const jl_meas *meas, int m);
 int jli_msg_meas_read(jl_meas *meas, jl_real *z, int m,
                       const unsigned char *buf, int len);
@@ -75,7 +77,7 @@ int jli_msg_modes(unsigned char *buf, const jl_par *par, const jl_hop *hop);
 int jli_msg_modes_read(jl_par *par, const jl_hop *hop,
                        const unsigned char *buf, int len);
 
-/* Without a covariance if estimate->P is NULL. */
+/* Of a constant-gain IMM if estimate->P is NULL. */
 int jli_msg_estimate(unsigned char *buf, const jl_estimate *estimate, int M,
                      int n);
 int jli_msg_estimate_read(jl_estimate *estimate, int M, int n,

@@ -18,6 +18,8 @@
 
 /* What the parallel filter must know of a kind of filter; j is a mode. */
 struct jl_par_kind {
+    int modes;                  /* the type of its MODES */
+
     /* The largest magnitude a measurement may have. */
     jl_real (*largest)(const jl_par *par);
 
@@ -39,6 +41,10 @@ struct jl_par_kind {
     int (*reals)(const jl_par *par, int j);
     unsigned char *(*put)(unsigned char *p, const jl_par *par, int j);
     const unsigned char *(*get)(const unsigned char *p, jl_par *par, int j);
+
+    /* 1 if l and the estimate of a mode that has not failed can be used; what a
+     * PE of ours sends always can. */
+    int (*is_sound)(const jl_par *par, int j);
 
     /* loglik, x, P (or NULL), mu of *estimate: the filter's own, or scratch. */
     void (*answer)(const jl_par *par, jl_estimate *estimate,

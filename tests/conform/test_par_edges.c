@@ -105,6 +105,139 @@ static void test_par_cg_messages_are_as_short_as_said(void **state)
         }
 }
 
+/* Binds *par of *bank, which is PE 1 of 2 and owns mode 1. */
+static void bind(jl_par *par, struct par_cg_bank *bank)
+{
+    static unsigned char owner[3] = { 0, 1, 0 }, buf[JL_PAR_CG_BUF(3, 3)];
+    static int status[3];
+    static jl_real z[3];
+    static jl_chan chan, *chans[2] = { &chan, &chan };
+    jl_par_config config = { 0 };
+
+    chan.max_len = JL_PAR_CG_MSG(3, 3);
+    config.npe = 2;
+    config.pe = 1;
+    config.owner = owner;
+    config.to = config.from = chans;
+    par_cg_init(bank, 3, 3);
+    assert_int_equal(bank->gains[1].order, 3);
+    memset(status, 0, sizeof status);
+    assert_int_equal(jl_par_init_cg(par, &bank->cg, &config, buf, sizeof buf,
+                                    status, z), JL_OK);
+}
+
+static const jl_hop of_mode_1 = { .from = 1, .first = 1, .count = 1 };
+
+/* Of a mode that has not failed: no number that is none, no square below 0. */
+static void test_par_cg_takes_no_unsound_mode(void **state)
+{
+    static struct par_cg_bank bank;
+    unsigned char msg[JL_PAR_CG_MSG(3, 3)];
+    const jl_real bad[] = { -1, jl_log(0), -jl_log(0), jl_log(0) * 0 };
+    jl_real good = 1;
+    int len, at, k;
+    jl_par par;
+
+    (void)state;
+    bind(&par, &bank);
+    len = jli_msg_modes(msg, &par, &of_mode_1);
+    for (at = 10; at < len; at += JL_REAL_OCTETS)
+        for (k = 0; k < 4; k++) {
+            int sound = at == 10 ? k == 2 : k == 0;
+
+            jl_put_reals(msg + at, &bad[k], 1);
+            assert_int_equal(jli_msg_modes_read(&par, &of_mode_1, msg, len),
+                             sound ? JL_OK : JL_EMSG);
+            jl_put_u16(msg + 8, (unsigned)-JL_ENONFINITE);
+            assert_int_equal(jli_msg_modes_read(&par, &of_mode_1, msg, len),
+                             JL_OK);
+            jl_put_u16(msg + 8, 0);
+            jl_put_reals(msg + at, &good, 1);
+        }
+    assert_int_equal(at, len);
+}
+
+/* A mode of an IMM of 3 states has as many reals as one of order 3 in 3 axes,
+ * an estimate as many as one of 9 states without covariance. */
+static void test_par_kinds_take_only_their_own(void **state)
+{
+    static struct par_cg_bank bank;
+    unsigned char msg[JL_PAR_CG_MSG(3, 3)];
+    jl_real x[9] = { 0 }, P[9] = { 0 }, mu[2] = { 0 };
+    jl_estimate imm = { 0 }, cg = { 0 };
+    int len;
+    jl_par par;
+
+    (void)state;
+    bind(&par, &bank);
+    len = jli_msg_modes(msg, &par, &of_mode_1);
+    assert_int_equal(len, 8 + JL_PAR_MODE(3));
+    assert_int_equal(jli_msg_modes_read(&par, &of_mode_1, msg, len), JL_OK);
+    msg[0] = JLI_MODES;
+    assert_int_equal(jli_msg_modes_read(&par, &of_mode_1, msg, len), JL_EMSG);
+
+    imm.x = cg.x = x;
+    imm.mu = cg.mu = mu;
+    imm.P = P;
+    len = jli_msg_estimate(msg, &imm, 2, 3);
+    assert_int_equal(jli_msg_estimate_read(&imm, 2, 3, msg, len), JL_OK);
+    assert_int_equal(jli_msg_estimate_read(&cg, 2, 9, msg, len), JL_EMSG);
+    assert_int_equal(jli_msg_estimate(msg, &cg, 2, 9), len);
+    assert_int_equal(jli_msg_estimate_read(&cg, 2, 9, msg, len), JL_OK);
+    assert_int_equal(jli_msg_estimate_read(&imm, 2, 3, msg, len), JL_EMSG);
+}
+
+/* The largest filter there may be, orders mixed: one message that carries all
+ * modes fits, and brings the bits of all that a mode has, but no more. */
+static void test_par_cg_largest_messages_fit(void **state)
+{
+    enum { M = JL_MAX_MODES, AXES = JL_MAX_STATES, X = M * AXES * 3 };
+    static jl_cg_gains gains[M];
+    static jl_real mem[2][JL_CGIMM_STATE(M, AXES)], Pi[M * M], z[AXES];
+    static unsigned char buf[JL_PAR_CG_BUF(M, AXES)], owner[M];
+    static unsigned char msg[JL_PAR_CG_MSG(M, AXES)];
+    static int status[M];
+    jl_par_config config = { 0 };
+    jl_hop hop = { .count = 1 };
+    int i, j, len, want = 8;
+    jl_estimate estimate = { 0 };
+    jl_cgimm cg[2];
+    jl_par par[2];
+
+    (void)state;
+    config.npe = 1;
+    config.owner = owner;
+    for (j = 0; j < M; j++) {
+        assert_int_equal(jl_cg_design(&gains[j], j % 3 == 1 ? 2 : 3, 1, 100,
+                                      1e4), JL_OK);
+        want += 2 + (1 + AXES * gains[j].order) * JL_REAL_OCTETS;
+        Pi[j * M + j] = 1;
+    }
+    for (i = 0; i < 2; i++) {
+        assert_int_equal(jl_cgimm_init(&cg[i], M, gains, AXES, 1, 1e4, Pi,
+                                       mem[i], JL_CGIMM_STATE(M, AXES)),
+                         JL_OK);
+        assert_int_equal(jl_par_init_cg(&par[i], &cg[i], &config, buf,
+                                        sizeof buf, status, z), JL_OK);
+    }
+    for (i = 0; i < X; i++)
+        cg[0].mixed[i] = (jl_real)(i + 1);
+    for (j = 0; j < M; j++)
+        cg[0].l[j] = (jl_real)j;
+    len = jli_msg_modes(msg, &par[0], &hop);
+    assert_int_equal(len, want);
+    assert_in_range(len, 1, JL_PAR_CG_MSG(M, AXES));
+    assert_int_equal(jli_msg_modes_read(&par[1], &hop, msg, len), JL_OK);
+    for (i = 0; i < X; i++)
+        assert_close(cg[1].mixed[i],
+                     i % 3 < gains[i / (3 * AXES)].order ? i + 1 : 0, 0);
+    assert_same_bits(cg[1].l, cg[0].l, M * sizeof *z);
+    estimate.x = cg[0].mixed;
+    estimate.mu = cg[0].mu;
+    assert_in_range(jli_msg_estimate(msg, &estimate, M, AXES * 3), 1,
+                    JL_PAR_CG_MSG(M, AXES));
+}
+
 /* --- pools --------------------------------------------------------------- */
 
 #define MODES 3
@@ -153,6 +286,9 @@ int main(void)
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_par_deadlines_grow_and_stay_numbers),
         cmocka_unit_test(test_par_cg_messages_are_as_short_as_said),
+        cmocka_unit_test(test_par_cg_takes_no_unsound_mode),
+        cmocka_unit_test(test_par_kinds_take_only_their_own),
+        cmocka_unit_test(test_par_cg_largest_messages_fit),
         cmocka_unit_test(test_pool_heeds_only_modes_that_are_possible),
     };
 

@@ -114,7 +114,7 @@ static void test_par_gate_gives_serial_bits_over_lcm(void **state)
 
 static void test_par_cg_gives_serial_bits_over_lcm(void **state)
 {
-    static const int modes[] = { 2, PAR_CG_M, 1, 3 };
+    static const int modes[] = { 2, 8, 1, 3 };
     struct par_shape s = { .hangs_at = -1 };
 
     (void)state;

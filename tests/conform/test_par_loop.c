@@ -356,7 +356,7 @@ static void check_cg(const struct par_shape *shape)
 
 static void test_par_cg_gives_serial_bits(void **state)
 {
-    static const int modes[] = { 1, 2, 3, PAR_CG_M };
+    static const int modes[] = { 1, 2, 3, 8 };
     static struct run run = { .shape = { .hangs_at = -1 } };
     struct par_shape *s = &run.shape;
     int k, slots;
@@ -376,7 +376,7 @@ static void test_par_cg_gives_serial_bits(void **state)
 
 static void test_par_cg_heeds_the_owner_table(void **state)
 {
-    static const unsigned char owners[][PAR_CG_M] = {
+    static const unsigned char owners[][8] = {
         { 1, 0, 1, 1, 1, 1, 1, 1 }, { 2, 0, 0, 1, 1, 1, 0, 2 },
         { 2, 1, 0, 0, 0, 0, 0, 0 }
     };
@@ -390,7 +390,7 @@ static void test_par_cg_heeds_the_owner_table(void **state)
     for (k = 0; k < 3; k++)
         for (s->topology = JL_TOPO_FULL; s->topology <= JL_TOPO_CHAIN;
              s->topology++)
-            for (s->M = least[k]; s->M <= PAR_CG_M; s->M++) {
+            for (s->M = least[k]; s->M <= 8; s->M++) {
                 s->owner = owners[k];
                 s->axes = 1 + s->M % PAR_CG_AXES;
                 compare(&run, s->M % 3);
@@ -424,10 +424,11 @@ static void test_par_cg_blames_the_dead(void **state)
 #define CG_PES 3
 #define CG_ROWS 20
 
-/* Every PE steps by itself, with measurements that it has already; one has got
- * a bad one. */
+/* Every PE steps by itself, with measurements that it has already; with one of
+ * them something is wrong. */
 struct alone {
     jl_loop *loop;
+    void (*live)(struct alone *a, int pe, jl_par *par);
     int M, bad_pe;
     int status[CG_PES][CG_ROWS];
     struct par_cg_bank bank[CG_PES];
@@ -435,6 +436,7 @@ struct alone {
 
 #define BAD_ROW(k) ((k) % 6 == 3)
 
+/* It has got bad measurements. */
 static void step_alone(struct alone *a, int pe, jl_par *par)
 {
     struct par_cg_bank *bank = &a->bank[pe], before;
@@ -490,7 +492,7 @@ static void alone_body(int pe, void *context)
     par_cg_init(&a->bank[pe], a->M, 1);
     assert_int_equal(jl_par_init_cg(&par, &a->bank[pe].cg, &config, buf,
                                     sizeof buf, status, z), JL_OK);
-    step_alone(a, pe, &par);
+    a->live(a, pe, &par);
 }
 
 /* All PEs tell the same, and go on as if the step had not been. */
@@ -503,7 +505,8 @@ static void test_par_cg_fails_for_all_or_none(void **state)
     int k, pe;
 
     (void)state;
-    for (a.M = CG_PES; a.M <= PAR_CG_M; a.M++)
+    a.live = step_alone;
+    for (a.M = CG_PES; a.M <= PAR_CG_M; a.M += a.M < 8 ? 1 : PAR_CG_M - 8)
         for (a.bad_pe = 0; a.bad_pe < CG_PES; a.bad_pe++) {
             a.loop = jl_loop_new(CG_PES, JL_PAR_CG_MSG(PAR_CG_M, 1), 1);
             assert_int_equal(jl_loop_run(a.loop, alone_body, &a), JL_OK);
@@ -531,6 +534,45 @@ static void test_par_cg_fails_for_all_or_none(void **state)
                 assert_same_bits(cg->xhat, serial.cg.xhat, 3 * sizeof *z);
             }
         }
+}
+
+/* Its own mode has come to infinity. */
+static void step_spoilt(struct alone *a, int pe, jl_par *par)
+{
+    struct par_cg_bank *bank = &a->bank[pe], before;
+    jl_real z[1];
+    jl_meas meas;
+    int k;
+
+    if (pe == a->bad_pe)
+        bank->cg.x[3 * pe + 1] = -jl_log(0);
+    for (k = 1; k < 4; k++) {
+        before = *bank;
+        par_cg_meas(&meas, z, k, 1);
+        a->status[pe][k] = jl_par_step(par, &meas, bank->scratch);
+        assert_same_bits(bank->cg.x, before.mem + (before.cg.x - bank->mem),
+                         (size_t)(3 * a->M) * sizeof *z);
+        assert_same_bits(bank->cg.mu, before.mem + (before.cg.mu - bank->mem),
+                         (size_t)a->M * sizeof *z);
+    }
+}
+
+static void test_par_cg_infinity_spreads_to_nobody(void **state)
+{
+    static struct alone a;
+    int k, pe;
+
+    (void)state;
+    a.live = step_spoilt;
+    a.M = CG_PES;
+    for (a.bad_pe = 0; a.bad_pe < CG_PES; a.bad_pe++) {
+        a.loop = jl_loop_new(CG_PES, JL_PAR_CG_MSG(PAR_CG_M, 1), 1);
+        assert_int_equal(jl_loop_run(a.loop, alone_body, &a), JL_OK);
+        jl_loop_free(a.loop);
+        for (k = 1; k < 4; k++)
+            for (pe = 0; pe < CG_PES; pe++)
+                assert_int_equal(a.status[pe][k], JL_ENONFINITE);
+    }
 }
 
 /* --- death ---------------------------------------------------------------- */
@@ -664,6 +706,7 @@ static const struct par_shape two_pes = {
     .npe = 2, .M = 3, .sticky = 1, .form = &jl_kf_joseph, .hangs_at = -1
 };
 
+#define X_TOP (9 + 2 * JL_REAL_OCTETS)         /* of x[0] in MODES */
 #define MODES_LEN (8 + 2 + (1 + PAR_N + JL_PACKED(PAR_N)) * JL_REAL_OCTETS)
 
 /* One octet of its READY or its MODES is another, or octets are missing. */
@@ -684,6 +727,7 @@ static void odd_pe1(const struct odd *odd, jl_chan *to, jl_chan *from)
     unsigned char ready[8] = { 1, 1, 2, 0, 7, 0, 0, 0 };
     unsigned char modes[MODES_LEN] = { 3, 1, 1, 0, 1, 0, 0, 0 };
 
+    modes[X_TOP - 1] = JL_REAL_FLOAT ? 0x80 : 0xf0;     /* next to nothing */
     if (odd->at >= 0)
         (odd->in_modes ? modes : ready)[odd->at] = (unsigned char)odd->value;
     (void)jl_chan_send(to, ready, 8 - !odd->in_modes * odd->missing, 0);
@@ -745,10 +789,12 @@ static void test_par_believes_no_odd_pe(void **state)
         { 0, 4, 8, 0, JL_EMODEL },      /* fingerprint */
         { 0, -1, 0, 1, JL_EMSG },
         { 1, 0, 9, 0, JL_EMSG },        /* type */
+        { 1, 0, 7, 0, JL_EMSG },        /* of a constant-gain IMM */
         { 1, 1, 0, 0, JL_EMSG },        /* from PE0 */
         { 1, 2, 2, 0, JL_EMSG },        /* two modes */
         { 1, 4, 2, 0, JL_EMSG },        /* of another measurement */
         { 1, 7, 1, 0, JL_EMSG },
+        { 1, X_TOP, 0x7f, 0, JL_EMSG }, /* infinity */
         { 1, -1, 0, 1, JL_ELENGTH }
     };
     static const struct odd good = { 1, -1, 0, 0, JL_OK };
@@ -870,6 +916,7 @@ int main(void)
         cmocka_unit_test(test_par_cg_heeds_the_owner_table),
         cmocka_unit_test(test_par_cg_blames_the_dead),
         cmocka_unit_test(test_par_cg_fails_for_all_or_none),
+        cmocka_unit_test(test_par_cg_infinity_spreads_to_nobody),
         cmocka_unit_test(test_par_blames_the_dead_and_not_the_relay),
         cmocka_unit_test(test_par_refuses_bad_measurements_with_a_code),
         cmocka_unit_test(test_par_believes_no_odd_pe),

@@ -14,6 +14,7 @@ extern "C" {
 }
 
 #include "jumplink.h"
+#include "manoeuvre.h"
 
 struct count counted;
 
@@ -187,6 +188,29 @@ void test_count_cgimm_stages_are_the_step(void **)
     assert_int_equal(by_stage.sums, is.sums);
 }
 
+// The table below, and what `jumplink sim --scenario manoeuvre1d` says.
+void test_count_table_is_as_told(void **)
+{
+    static const long told[3][STAGES][2] = {
+        { { 11, 8 }, { 7, 9 }, { 3, 4 }, { 3, 6 } },
+        { { 74, 80 }, { 180, 164 }, { 7, 9 }, { 30, 39 } },
+        { { 74, 80 }, { 294, 242 }, { 7, 9 }, { 30, 39 } }
+    };
+    const struct step is[] = { count_cgimm(10, 1), count_imm(&jl_kf_standard),
+                               count_imm(&jl_kf_joseph) };
+    const struct count cg = sum_of(is[0]), imm = sum_of(is[1]);
+
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < STAGES; i++) {
+            assert_int_equal(is[k].stage[i].products, told[k][i][0]);
+            assert_int_equal(is[k].stage[i].sums, told[k][i][1]);
+        }
+    assert_int_equal(cg.products, MAN_CG_PRODUCTS);
+    assert_int_equal(cg.sums, MAN_CG_SUMS);
+    assert_int_equal(imm.products, MAN_IMM_PRODUCTS);
+    assert_int_equal(imm.sums, MAN_IMM_SUMS);
+}
+
 // Against a count by hand: 3 x 2 x 2 times 2 x 2 x 3.
 void test_count_counts(void **)
 {
@@ -242,6 +266,7 @@ int main()
         cmocka_unit_test(test_count_counts),
         cmocka_unit_test(test_count_cgimm_step_is_cheap),
         cmocka_unit_test(test_count_cgimm_stages_are_the_step),
+        cmocka_unit_test(test_count_table_is_as_told),
     };
 
     print_table();

@@ -148,19 +148,23 @@ void crew_leave(jl_lcm *lcm, struct crew_node *node, int failed,
 
 /* --- the parallel filter ------------------------------------------------- */
 
-static struct par_shape shape_of(int sticky)
+static struct par_shape shape_of(int kind)
 {
     struct par_shape shape = { .npe = CREW_PES, .M = PAR_M,
                                .form = &jl_kf_joseph, .hangs_at = -1 };
 
-    shape.sticky = sticky;
+    shape.sticky = kind == CREW_STICKY;
+    if (kind == CREW_CG) {
+        shape.M = 8;
+        shape.axes = PAR_CG_AXES;
+    }
     return shape;
 }
 
-static void live_in_filter(const char *run, int which, int sticky,
+static void live_in_filter(const char *run, int which, int kind,
                            jl_u32 rto_us, const fault_set *set, struct crew_node *node)
 {
-    struct par_shape shape = shape_of(sticky);
+    struct par_shape shape = shape_of(kind);
     jl_chan *to[CREW_PES + 1], *from[CREW_PES + 1];
     jl_lcm *lcm = crew_join(run, which, CREW_PES + 1,
                             JL_PAR_MSG(PAR_M, PAR_N, PAR_Z), rto_us, set,
@@ -183,7 +187,7 @@ static void live_in_filter(const char *run, int which, int sticky,
     crew_leave(lcm, node, status != JL_OK, CREW_LINGER_US);
 }
 
-void crew_start_filter(pid_t *child, const char *run, int sticky,
+void crew_start_filter(pid_t *child, const char *run, int kind,
                        jl_u32 rto_us, const fault_set *set, struct crew_node *nodes)
 {
     int i;
@@ -191,14 +195,14 @@ void crew_start_filter(pid_t *child, const char *run, int sticky,
     for (i = 0; i <= CREW_PES; i++) {
         child[i] = crew_fork();
         if (child[i] == 0)
-            live_in_filter(run, i, sticky, rto_us, set, &nodes[i]);
+            live_in_filter(run, i, kind, rto_us, set, &nodes[i]);
     }
 }
 
-const struct par_trace *crew_serial(int sticky)
+const struct par_trace *crew_serial(int kind)
 {
     static struct par_trace trace;
-    struct par_shape shape = shape_of(sticky);
+    struct par_shape shape = shape_of(kind);
 
     par_serial(&trace, &shape);
     return &trace;

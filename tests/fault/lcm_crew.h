@@ -47,11 +47,14 @@ void crew_leave(jl_lcm *lcm, struct crew_node *node, int failed,
                 long linger_us);
 #define CREW_LINGER_US 4000000L         /* dozens of repetitions            */
 
+/* An IMM, with a chain of any kind or a sticky one; a constant-gain IMM. */
+enum { CREW_GENERAL, CREW_STICKY, CREW_CG, CREW_KINDS };
+
 /* Start a parallel filter of CREW_PES and its host: nodes[CREW_PES + 1],
  * child[CREW_PES + 1].  The host's trace is to be crew_serial's. */
-void crew_start_filter(pid_t *child, const char *run, int sticky,
+void crew_start_filter(pid_t *child, const char *run, int kind,
                        jl_u32 rto_us, const fault_set *set, struct crew_node *nodes);
-const struct par_trace *crew_serial(int sticky);
+const struct par_trace *crew_serial(int kind);
 
 double crew_clock(void);        /* s */
 

@@ -211,23 +211,28 @@ static int live_in_filter(int node, void *context)
 
 void linked_suite_gives_serial_bits(const linked_port *over)
 {
-    static struct par_trace serial[2];
-    static const struct par_shape shape = {
-        .npe = PAR_PES, .M = PAR_M, .form = &jl_kf_joseph, .hangs_at = -1
+    static const struct par_shape shapes[] = {
+        { .M = PAR_M, .form = &jl_kf_joseph },
+        { .M = PAR_M, .form = &jl_kf_joseph, .sticky = 1 },
+        { .M = PAR_PES, .axes = 1 },            /* constant gains */
+        { .M = 8, .axes = PAR_CG_AXES }
     };
+    static struct par_trace serial;
     static struct filter filter;
-    int *sticky = &filter.shape.sticky, s;
+    int s, k;
 
     w.over = over;
-    filter.shape = shape;
-    for (*sticky = 0; *sticky < 2; ++*sticky)
-        par_serial(&serial[*sticky], &filter.shape);
-    for (s = 0; s < PAIR_SETS; s++) {
-        w.set = &pair_sets[s];
-        *sticky = s % 2;
-        assert_int_equal(run(PAR_PES + 1, JL_PAR_MSG(PAR_M, PAR_N, PAR_Z),
-                             live_in_filter, &filter), 0);
-        assert_same_bits(&filter.trace, &serial[*sticky],
-                         sizeof filter.trace);
+    for (k = 0; k < 4; k++) {
+        filter.shape = shapes[k];
+        filter.shape.npe = PAR_PES;
+        filter.shape.hangs_at = -1;
+        par_serial(&serial, &filter.shape);
+        for (s = k % 2; s < PAIR_SETS; s += 2) {
+            w.set = &pair_sets[s];
+            assert_int_equal(run(PAR_PES + 1,
+                                 JL_PAR_MSG(PAR_M, PAR_N, PAR_Z),
+                                 live_in_filter, &filter), 0);
+            assert_same_bits(&filter.trace, &serial, sizeof serial);
+        }
     }
 }

@@ -24,7 +24,8 @@ void linked_suite_million(const linked_port *over);
 /* The channel contract, under each fault set. */
 void linked_suite_conforms(const linked_port *over);
 
-/* The parallel filter gives the serial bits, under each fault set. */
+/* The parallel filter, an IMM and a constant-gain IMM, gives the serial bits,
+ * under each fault set. */
 void linked_suite_gives_serial_bits(const linked_port *over);
 
 #endif

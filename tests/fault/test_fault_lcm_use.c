@@ -97,13 +97,13 @@ static void test_fault_lcm_gives_serial_bits(void **state)
     crew_need_net();
     for (s = 0; s < PAIR_SETS; s++, nodes += CREW_PES + 1) {
         snprintf(name, sizeof name, "par%d", s);
-        crew_start_filter(child[s], name, s % 2, RTO_US, &pair_sets[s],
-                          nodes);
+        crew_start_filter(child[s], name, s % CREW_KINDS, RTO_US,
+                          &pair_sets[s], nodes);
     }
     nodes = crew_nodes;
     for (s = 0; s < PAIR_SETS; s++, nodes += CREW_PES + 1) {
         assert_int_equal(crew_failures(child[s], CREW_PES + 1), 0);
-        assert_same_bits(&nodes[CREW_PES].trace, crew_serial(s % 2),
+        assert_same_bits(&nodes[CREW_PES].trace, crew_serial(s % CREW_KINDS),
                          sizeof nodes->trace);
         printf("%-12s %8.2f ms a step of %d PEs, %d filters at once\n",
                pair_sets[s].name, 1e3 * nodes[CREW_PES].seconds / PAR_STEPS,

@@ -45,7 +45,7 @@ static void test_fault_network_loses(void **state)
     static const int percent[] = { 10, 30 };
     pid_t child[CREW_PES + 1];
     char name[32];
-    int i, sticky;
+    int i, kind;
 
     (void)state;
     crew_need_net();
@@ -56,15 +56,15 @@ static void test_fault_network_loses(void **state)
     printf("%-8s %10s %10s %8s %12s\n", "drop", "dropped", "pieces",
            "resent", "ms a step");
     for (i = 0; i < 2; i++)
-        for (sticky = 0; sticky < 2; sticky++) {
+        for (kind = 0; kind < CREW_KINDS; kind++) {
             unsigned long sent = 0, resent = 0;
             int k;
 
             assert_int_equal(lose(percent[i]), 0);
-            snprintf(name, sizeof name, "net%d_%d", percent[i], sticky);
-            crew_start_filter(child, name, sticky, 0, NULL, crew_nodes);
+            snprintf(name, sizeof name, "net%d_%d", percent[i], kind);
+            crew_start_filter(child, name, kind, 0, NULL, crew_nodes);
             assert_int_equal(crew_failures(child, CREW_PES + 1), 0);
-            assert_same_bits(&crew_nodes[CREW_PES].trace, crew_serial(sticky),
+            assert_same_bits(&crew_nodes[CREW_PES].trace, crew_serial(kind),
                              sizeof crew_nodes->trace);
             for (k = 0; k <= CREW_PES; k++) {
                 sent += crew_nodes[k].count.sent;

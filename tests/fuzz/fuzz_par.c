@@ -7,7 +7,9 @@
  * received; a message of another length, or with another header, is refused.
  * If nothing was altered, the host gets the serial filter's bits (an all-reduce
  * has its own, which are not compared), and for what is refused the code that
- * par.h promises.  Some games have a gate. */
+ * par.h promises.  Some games have a gate; in some the filter is a constant-gain
+ * IMM, of which no PE ever holds a number that is not finite, nor changes what a
+ * step that failed has begun. */
 #include "fuzz.h"
 
 #include <stdlib.h>
@@ -17,8 +19,10 @@
 #include "loop/port_loop.h"
 
 enum { M = 3, N = 2, Z = 1, PES = 3, NODES = PES + 1, ROWS = 12 };
+enum { ORDER = 3 };             /* of the constant-gain IMM: 2, 3, 2        */
 enum { LONGEST = JL_PAR_MSG(M, N, Z), WAIT_US = 1000000 };
 enum { ESTIMATE = 8 + (1 + N + JL_PACKED(N) + M) * JL_REAL_OCTETS };
+JL_STATIC_ASSERT(LONGEST >= JL_PAR_CG_MSG(M, Z), a_message_has_room);
 
 struct bank {
     jl_mode modes[M];
@@ -26,6 +30,10 @@ struct bank {
     jl_real mem[JL_IMM_STATE(M, N, N)];
     jl_real scratch[JL_IMM_SCRATCH(M, N, Z)];
     jl_imm imm;
+    jl_cg_gains gains[M];
+    jl_real cg_mem[JL_CGIMM_STATE(M, Z)];
+    jl_real before[JL_CGIMM_STATE(M, Z)];       /* the present step         */
+    jl_cgimm cg;
 };
 
 struct game;
@@ -44,6 +52,7 @@ struct game {
     fuzz_script script;
     jl_loop *loop;
     int npe, topology, exchange, gate;
+    int cg;                     /* the filter is a constant-gain IMM        */
     struct bent from[NODES][NODES];     /* [receiver][sender]               */
     struct bank bank[NODES];            /* the host's is the serial filter  */
     jl_u32 last_seq[NODES];
@@ -157,15 +166,17 @@ static const jl_chan_ops bent_ops = { bent_send, bent_recv, bent_wait };
 
 /* --- the filter ---------------------------------------------------------- */
 
+static const jl_real other[M * M] = {
+    JL_C(0.9), JL_C(0.05), JL_C(0.05), JL_C(0.1), JL_C(0.8), JL_C(0.1),
+    JL_C(0.2), JL_C(0.1), JL_C(0.7)
+};
+
 static void bank_init(struct bank *bank, int sticky, int gate)
 {
     static const jl_real mu[M] = { 0.5, 0.25, 0.25 };
     static const jl_real alike[M * M] = {
         JL_C(0.9), JL_C(0.05), JL_C(0.05), JL_C(0.05), JL_C(0.9), JL_C(0.05),
         JL_C(0.05), JL_C(0.05), JL_C(0.9)
-    }, other[M * M] = {
-        JL_C(0.9), JL_C(0.05), JL_C(0.05), JL_C(0.1), JL_C(0.8), JL_C(0.1),
-        JL_C(0.2), JL_C(0.1), JL_C(0.7)
     };
     jl_motion motion = { JL_MOTION_CV, Z, N, 0, 0, 2, 0 };
     jl_real x[M * N], P[M * N * N], zero = 0;
@@ -186,6 +197,19 @@ static void bank_init(struct bank *bank, int sticky, int gate)
     FUZZ_HOLDS(jl_imm_set(&bank->imm, x, P, mu, bank->scratch) == JL_OK);
     if (gate)
         FUZZ_HOLDS(jl_imm_gate(&bank->imm, JL_C(10.83), 2) == JL_OK);
+}
+
+static void bank_init_cg(struct bank *bank)
+{
+    int j;
+
+    memset(bank, 0, sizeof *bank);
+    for (j = 0; j < M; j++)
+        FUZZ_HOLDS(jl_cg_design(&bank->gains[j], 2 + j % 2, 1,
+                                (jl_real)(1 + 20 * j), 4) == JL_OK);
+    FUZZ_HOLDS(jl_cgimm_init(&bank->cg, M, bank->gains, Z, 1, 4, other,
+                             bank->cg_mem, JL_CGIMM_STATE(M, Z)) == JL_OK);
+    FUZZ_HOLDS(bank->cg.order == ORDER);
 }
 
 static int within(jl_real v, jl_real limit)
@@ -210,6 +234,42 @@ static void take_up(struct game *g, int node, const jl_meas *meas)
     FUZZ_HOLDS(usable(g, node, meas) == JL_OK);
     g->started[node] = 1;
     g->last_seq[node] = meas->seq;
+}
+
+/* Before a step of the constant-gain IMM, on every PE: not for any dt; at a new
+ * record a mode's gains start again. */
+static int renew(struct bank *bank, const jl_meas *meas)
+{
+    if (meas->dt > 12)
+        return JL_ERANGE;
+    if (meas->first)
+        jl_cgimm_restart(&bank->cg, (int)(meas->seq % M));
+    memcpy(bank->before, bank->cg_mem, sizeof bank->before);
+    return JL_OK;
+}
+
+static int kept(const struct bank *bank, const jl_real *v, int n)
+{
+    return memcmp(v, bank->before + (v - bank->cg_mem),
+                  (size_t)n * sizeof *v) == 0;
+}
+
+static void check_cg(const struct bank *bank)
+{
+    const jl_cgimm *cg = &bank->cg;
+    jl_real sum = 0;
+    int i;
+
+    for (i = 0; i < 3 * M * Z; i++)
+        FUZZ_HOLDS(within(cg->x[i], JL_REAL_MAX));
+    for (i = 0; i < M; i++) {
+        FUZZ_HOLDS(cg->mu[i] >= 0);
+        sum += cg->mu[i];
+    }
+    FUZZ_HOLDS(within(sum - 1, 8 * JL_EPSILON));
+    if (cg->stage == 2)         /* filtered, but not weighed: a step failed */
+        FUZZ_HOLDS(kept(bank, cg->x, 3 * M * Z) && kept(bank, cg->mu, M) &&
+                   kept(bank, cg->w, 3 * M));
 }
 
 /* --- a PE ---------------------------------------------------------------- */
@@ -249,6 +309,38 @@ static int prepare(void *context, jl_imm *imm, const jl_meas *meas)
     return JL_OK;
 }
 
+static int prepare_cg(void *context, jl_cgimm *cg, const jl_meas *meas)
+{
+    struct prepared *p = context;
+    struct bank *bank = &p->game->bank[p->pe];
+
+    (void)cg;
+    check_cg(bank);
+    (void)prepare(context, NULL, meas);
+    return renew(bank, meas);
+}
+
+/* Bind a PE's part to the game's filter, and serve. */
+static int serve(jl_par *par, struct game *g, struct bank *bank,
+                 const jl_par_config *config, unsigned char *buf, int *status,
+                 jl_real *z)
+{
+    int ended;
+
+    if (!g->cg) {
+        bank_init(bank, g->exchange == JL_EXCHANGE_REDUCE, g->gate);
+        FUZZ_HOLDS(jl_par_init(par, &bank->imm, config, buf,
+                               JL_PAR_BUF(M, N, Z), status, z) == JL_OK);
+        return jl_par_serve(par, bank->scratch);
+    }
+    bank_init_cg(bank);
+    FUZZ_HOLDS(jl_par_init_cg(par, &bank->cg, config, buf,
+                              JL_PAR_BUF(M, N, Z), status, z) == JL_OK);
+    ended = jl_par_serve(par, bank->scratch);
+    check_cg(bank);
+    return ended;
+}
+
 static void be_pe(struct game *g, int pe, jl_chan **to, jl_chan **from)
 {
     unsigned char owner[M], *buf = malloc(JL_PAR_BUF(M, N, Z));
@@ -260,7 +352,6 @@ static void be_pe(struct game *g, int pe, jl_chan **to, jl_chan **from)
 
     context.game = g;
     context.pe = pe;
-    bank_init(&g->bank[pe], g->exchange == JL_EXCHANGE_REDUCE, g->gate);
     jl_par_deal(owner, M, g->npe);
     memset(&config, 0, sizeof config);
     config.pe = pe;
@@ -273,12 +364,11 @@ static void be_pe(struct game *g, int pe, jl_chan **to, jl_chan **from)
     config.to_host = to[g->npe];
     config.from_host = from[g->npe];
     config.prepare = prepare;
+    config.prepare_cg = prepare_cg;
     config.context = &context;
     config.fingerprint = 7;
     config.start_us = config.timeout_us = WAIT_US;
-    FUZZ_HOLDS(jl_par_init(&par, &g->bank[pe].imm, &config, buf,
-                           JL_PAR_BUF(M, N, Z), status, z) == JL_OK);
-    ended = jl_par_serve(&par, g->bank[pe].scratch);
+    ended = serve(&par, g, &g->bank[pe], &config, buf, status, z);
     FUZZ_HOLDS(ended <= 0);
     FUZZ_HOLDS(z[Z] == 0);
     FUZZ_HOLDS(g->altered || ended == JL_OK || ended == JL_ECLOSED);
@@ -312,64 +402,96 @@ static int some_meas(struct game *g, jl_meas *meas, jl_real *z)
 }
 
 /* An estimate has the octets that it was read from (layout: par_msg.h). */
-static void check_octets(const jl_estimate *e, const struct bent *from)
+static void check_octets(const jl_estimate *e, const struct bent *from, int n)
 {
     unsigned char octets[ESTIMATE], *p = octets + 8;
     int i;
 
     memset(octets, 0, 8);
-    octets[0] = 4;
+    octets[0] = e->P != NULL ? 4 : 8;
     octets[1] = (unsigned char)e->verdict;
     jl_put_u16(octets + 2, (unsigned)-e->status);
     jl_put_u32(octets + 4, e->seq);
     if (e->status == JL_OK) {
         p = jl_put_reals(p, &e->loglik, 1);
-        p = jl_put_reals(p, e->x, N);
-        for (i = 0; i < N; i++)
-            p = jl_put_reals(p, e->P + i * N + i, N - i);
+        p = jl_put_reals(p, e->x, n);
+        for (i = 0; i < n && e->P != NULL; i++)
+            p = jl_put_reals(p, e->P + i * n + i, n - i);
         p = jl_put_reals(p, e->mu, M);
     }
     FUZZ_HOLDS(from->last_len == (int)(p - octets));
     FUZZ_HOLDS(memcmp(from->last, octets, (size_t)(p - octets)) == 0);
 }
 
+static int step(jl_estimate *e, struct bank *bank, const jl_meas *meas)
+{
+    jl_imm *imm = &bank->imm;
+    int status = jl_imm_step(imm, meas->z, bank->scratch);
+
+    e->verdict = imm->verdict;
+    e->loglik = imm->loglik;
+    e->x = imm->xhat;
+    e->P = imm->Phat;
+    e->mu = imm->mu;
+    return status;
+}
+
+static int step_cg(jl_estimate *e, struct bank *bank, const jl_meas *meas)
+{
+    jl_cgimm *cg = &bank->cg;
+    int status = renew(bank, meas);
+
+    if (status == JL_OK)
+        status = jl_cgimm_step(cg, meas->z);
+    jl_cgimm_estimate(cg, bank->scratch);
+    e->verdict = meas->z != NULL ? JL_ACCEPTED : JL_MISSING;
+    e->loglik = jl_cgimm_loglik(cg);
+    e->x = bank->scratch;
+    e->mu = cg->mu;
+    return status;
+}
+
 /* The serial filter's answer. */
 static void check_answer(struct game *g, const jl_meas *meas, int m,
-                         const jl_estimate *e)
+                         const jl_estimate *e, int n)
 {
     struct bank *serial = &g->bank[g->npe];
-    const jl_imm *imm = &serial->imm;
     int status = m == Z ? usable(g, g->npe, meas) : JL_EMSG;
+    jl_estimate want;
 
     if (status == JL_OK) {
         take_up(g, g->npe, meas);
-        status = jl_imm_step(&serial->imm, meas->z, serial->scratch);
+        status = (g->cg ? step_cg : step)(&want, serial, meas);
     }
     FUZZ_HOLDS(e->seq == meas->seq);
     FUZZ_HOLDS(e->status == status);
-    FUZZ_HOLDS(e->verdict == (status == JL_OK ? imm->verdict : 0));
+    FUZZ_HOLDS(e->verdict == (status == JL_OK ? want.verdict : 0));
     if (status != JL_OK)
         return;
-    FUZZ_HOLDS(memcmp(e->x, imm->xhat, N * sizeof *e->x) == 0);
-    FUZZ_HOLDS(memcmp(e->P, imm->Phat, N * N * sizeof *e->P) == 0);
-    FUZZ_HOLDS(memcmp(e->mu, imm->mu, M * sizeof *e->mu) == 0);
-    FUZZ_HOLDS(memcmp(&e->loglik, &imm->loglik, sizeof e->loglik) == 0);
+    FUZZ_HOLDS(memcmp(e->x, want.x, (size_t)n * sizeof *e->x) == 0);
+    FUZZ_HOLDS(e->P == NULL ||
+               memcmp(e->P, want.P, (size_t)(n * n) * sizeof *e->P) == 0);
+    FUZZ_HOLDS(memcmp(e->mu, want.mu, M * sizeof *e->mu) == 0);
+    FUZZ_HOLDS(memcmp(&e->loglik, &want.loglik, sizeof e->loglik) == 0);
 }
 
 static void be_host(struct game *g, jl_chan *to, jl_chan *from)
 {
     unsigned char buf[LONGEST];
-    jl_real x[N], P[N * N], mu[M], z[Z + 1];
+    jl_real x[ORDER], P[N * N], mu[M], z[Z + 1];
     jl_estimate estimate;
     jl_meas meas;
-    int row, m, status;
+    int row, m, status, n = g->cg ? ORDER : N;
 
     memset(&estimate, 0, sizeof estimate);
     memset(&meas, 0, sizeof meas);
     estimate.x = x;
-    estimate.P = P;
+    estimate.P = g->cg ? NULL : P;
     estimate.mu = mu;
-    bank_init(&g->bank[g->npe], 0, g->gate);
+    if (g->cg)
+        bank_init_cg(&g->bank[g->npe]);
+    else
+        bank_init(&g->bank[g->npe], 0, g->gate);
     status = jl_host_ready(from, 7, &estimate.failed_pe, buf, sizeof buf,
                            WAIT_US);
     g->begun = 1;
@@ -379,16 +501,16 @@ static void be_host(struct game *g, jl_chan *to, jl_chan *from)
         g->spoilt = 0;
         status = jl_host_send(to, &meas, m, buf, sizeof buf, WAIT_US);
         if (status == JL_OK)
-            status = jl_host_recv(from, &estimate, M, N, buf, sizeof buf,
+            status = jl_host_recv(from, &estimate, M, n, buf, sizeof buf,
                                   WAIT_US);
         if (status == JL_OK)
-            check_octets(&estimate, &g->from[g->npe][0]);
+            check_octets(&estimate, &g->from[g->npe][0], n);
         if (status == JL_OK && estimate.seq == meas.seq &&
             estimate.status == JL_OK)
             FUZZ_HOLDS(!g->spoilt);
         if (status == JL_OK && !g->altered &&
             g->exchange == JL_EXCHANGE_GATHER)
-            check_answer(g, &meas, m, &estimate);
+            check_answer(g, &meas, m, &estimate, n);
     }
     FUZZ_HOLDS(g->altered || status == JL_OK);
     if (fuzz_octet(&g->script) % 8 != 7)
@@ -432,8 +554,10 @@ int fuzz_par(const unsigned char *data, size_t size)
     first = fuzz_octet(&g.script);
     g.npe = 1 + (int)(first % PES);
     g.topology = (int)(first >> 2 & 3);
-    g.exchange = first >> 7 ? JL_EXCHANGE_REDUCE : JL_EXCHANGE_GATHER;
-    g.gate = (first >> 4 & 7) > 5;
+    g.cg = first >> 5 == 7;
+    g.exchange = first >> 7 && !g.cg ? JL_EXCHANGE_REDUCE
+                                     : JL_EXCHANGE_GATHER;
+    g.gate = first >> 5 == 3;
     g.loop = jl_loop_new(g.npe + 1, LONGEST, (int)(first >> 4 & 7) % 3);
     FUZZ_HOLDS(g.loop != NULL);
     FUZZ_HOLDS(jl_loop_run(g.loop, be_node, &g) == JL_OK);
