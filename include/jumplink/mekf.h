@@ -90,16 +90,27 @@ typedef struct jl_mekf {
     jl_real *xhat;              /* [n]                                      */
     jl_real *U;                 /* [n+m,n+m] upper, diagonal >= 0           */
     jl_real *U1;                /* [n,n]                                    */
-    jl_real *UQ;                /* [p1+p2,p1+p2]                            */
-    jl_real *UQ1;               /* [p1,p1]                                  */
+    jl_real *UQ;                /* [p1+p2,p1+p2]; its leading block is U_Q1 */
     jl_real *UR;                /* [r,r]                                    */
 } jl_mekf;
 
 /* Reals of state, and of scratch, which means nothing between calls. */
 #define JL_MEKF_STATE(n, m, r, p1, p2) \
     (((n) + (m)) * ((n) + (m) + 1) + (n) * ((n) + 1) \
-     + ((p1) + (p2)) * ((p1) + (p2)) + (p1) * (p1) + (r) * (r))
-#define JL_MEKF_SCRATCH(n, m, r, p1, p2) 0 /* TODO */
+     + ((p1) + (p2)) * ((p1) + (p2)) + (r) * (r))
+#define JL_MEKF_SCRATCH(n, m, r, p1, p2) \
+    (JL_MEKF_ARRAY(n, m, r, p1, p2) + JL_MEKF_ARRAY_B(n, m, r, p1) \
+     + JL_MEKF_LINEAR(n, m, r, p1, p2) + ((r) + 1) * (n) \
+     + ((p1) + (p2)) * ((p1) + (p2)))
+
+/* ... of which: the arrays of A and of B that are made triangular (the latter
+ * with rows for `spread`), and F, G, H, c, xp, z - c xp. */
+#define JL_MEKF_ARRAY(n, m, r, p1, p2) \
+    (((r) + (n) + (m) + (p1) + (p2)) * ((r) + (n) + (m)))
+#define JL_MEKF_ARRAY_B(n, m, r, p1) \
+    (((r) + 2 * (n) + (m) + (p1)) * ((r) + (n)))
+#define JL_MEKF_LINEAR(n, m, r, p1, p2) \
+    (((n) + (m)) * ((n) + (m) + (p1) + (p2) + (r) + 1) + (r) * ((n) + 1))
 
 /* Bind a filter to its model, which outlives it, and its memory: mem [cap],
  * cap >= JL_MEKF_STATE.  Q [p1+p2,p1+p2], R [r,r] positive semidefinite: R may
@@ -143,9 +154,13 @@ typedef struct jl_ekf {
 #define JL_EKF_STATE(n, m, r, p1, p2) \
     (((n) + (m)) * ((n) + (m) + 1) + ((p1) + (p2)) * ((p1) + (p2)) \
      + (r) * (r))
+#define JL_EKF_SCRATCH(n, m, r, p1, p2) \
+    (JL_MEKF_LINEAR(n, m, r, p1, p2) \
+     + ((n) + (m)) * (2 * ((n) + (m)) + (p1) + (p2) + (r)) + (r) * (r) \
+     + ((p1) + (p2)) * ((p1) + (p2)))
 
 /* As jl_mekf_init, _set and _step, and with the same codes; JL_ESINGULAR is of
- * S.  scratch [JL_MEKF_SCRATCH] */
+ * S.  scratch [JL_EKF_SCRATCH] */
 int jl_ekf_init(jl_ekf *filter, const jl_mekf_model *model, const jl_real *Q,
                 const jl_real *R, jl_real *mem, int cap, jl_real *scratch);
 int jl_ekf_set(jl_ekf *filter, const jl_real *x, const jl_real *P,

@@ -94,6 +94,14 @@
 #define jl_cg_adaptive_set jl_cg_adaptive_set_f32
 #define jl_cg_adaptive_step jl_cg_adaptive_step_f32
 
+#define jl_mekf_init jl_mekf_init_f32
+#define jl_mekf_set jl_mekf_set_f32
+#define jl_mekf_step jl_mekf_step_f32
+#define jl_mekf_cov jl_mekf_cov_f32
+#define jl_ekf_init jl_ekf_init_f32
+#define jl_ekf_set jl_ekf_set_f32
+#define jl_ekf_step jl_ekf_step_f32
+
 #define jl_put_real jl_put_real_f32
 #define jl_get_real jl_get_real_f32
 #define jl_put_reals jl_put_reals_f32
