@@ -175,7 +175,7 @@ $(BUILD)/tests/test_count: $(BUILD)/count/tests/count/test_count.o $(COUNTED)
 	@mkdir -p $(@D); echo '  $@'; $(CXX) $(CFLAGS) $^ -lcmocka -lm -o $@
 
 # The reference cases as C tables, so that the same test bodies run on a board.
-GOLDEN := $(if $(wildcard tests/golden/gen_golden.c),$(patsubst %,$(BUILD)/golden/%_cases.h,imm cgimm))
+GOLDEN := $(if $(wildcard tests/golden/gen_golden.c),$(patsubst %,$(BUILD)/golden/%_cases.h,imm cgimm mekf))
 golden: $(GOLDEN)
 $(BUILD)/golden/%_cases.h: $(BUILD)/gen_golden $(wildcard tests/golden/*/*/*)
 	@mkdir -p $(@D)

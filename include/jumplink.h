@@ -33,6 +33,7 @@
 #include "jumplink/kf.h"
 #include "jumplink/imm.h"
 #include "jumplink/cgimm.h"
+#include "jumplink/mekf.h"
 #include "jumplink/chan.h"
 #include "jumplink/wire.h"
 #include "jumplink/link.h"

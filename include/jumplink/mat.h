@@ -59,6 +59,13 @@ void jl_mat_ud(jl_real *S, const jl_real *A, jl_real *work, int n);
 /* P = U' D U from S, as above.  P may not be S.                    n^3/3  */
 void jl_mat_ud_product(jl_real *P, const jl_real *S, int n);
 
+/* A [rows,cols] to an upper triangle, in place, by Givens rotations from the
+ * left: A becomes T A with T orthogonal, zeros below the diagonal, and the
+ * diagonal >= 0; so A'A stays.  If A's columns are independent this is the only
+ * such triangle.  Elements up to JL_LARGE; a NaN makes more of them.
+ *                                           2 cols^2 (rows - cols / 3)      */
+void jl_mat_givens(jl_real *A, int rows, int cols);
+
 /* --- symmetric --------------------------------------------------------- */
 
 /* Packed upper triangle, row by row: p [n(n+1)/2]. */

@@ -25,6 +25,7 @@
 #define jl_mat_lower_solve jl_mat_lower_solve_f32
 #define jl_mat_ud jl_mat_ud_f32
 #define jl_mat_ud_product jl_mat_ud_product_f32
+#define jl_mat_givens jl_mat_givens_f32
 #define jl_mat_pack jl_mat_pack_f32
 #define jl_mat_unpack jl_mat_unpack_f32
 #define jl_vec_within jl_vec_within_f32
@@ -92,6 +93,14 @@
 #define jl_cg_adaptive_init jl_cg_adaptive_init_f32
 #define jl_cg_adaptive_set jl_cg_adaptive_set_f32
 #define jl_cg_adaptive_step jl_cg_adaptive_step_f32
+
+#define jl_mekf_init jl_mekf_init_f32
+#define jl_mekf_set jl_mekf_set_f32
+#define jl_mekf_step jl_mekf_step_f32
+#define jl_mekf_cov jl_mekf_cov_f32
+#define jl_ekf_init jl_ekf_init_f32
+#define jl_ekf_set jl_ekf_set_f32
+#define jl_ekf_step jl_ekf_step_f32
 
 #define jl_put_real jl_put_real_f32
 #define jl_get_real jl_get_real_f32

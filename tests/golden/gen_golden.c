@@ -1,6 +1,6 @@
 /* Turns the reference cases of a kind of filter into C tables, so that the same
  * test runs on a PC and on a board:  gen_golden DIR KIND > KIND_cases.h
- * DIR holds one folder a case: model.json, z.csv, expected.csv. */
+ * DIR holds one folder a case: model.json, z.csv, and what is expected. */
 #include <dirent.h>
 #include <jansson.h>
 #include <stdio.h>
@@ -63,15 +63,23 @@ static int put_csv(const char *name, const char *what, const char *path)
     return rows;
 }
 
-/* What a case's struct holds behind its name and sizes, but for z and expected:
- * by mode, and once. */
+/* What a case's struct holds behind its name: words; sizes, M before and p behind
+ * them if there are modes; rows; numbers by mode, at the top, in params; tables. */
 static const struct kind {
     const char *name;
-    const char *modes[9], *top[5];
+    const char *words[3], *sizes[6], *modes[9], *top[7], *params[18];
+    const char *tables[4];
 } kinds[] = {
-    { "imm", { "Phi", "Gamma", "Q", "H", "R", "w_bar", "x0", "P0" },
-      { "Pi", "mu0" } },
-    { "cgimm", { "x0", "w0", "winf", "kc" }, { "T", "R", "Pi", "mu0" } }
+    { "imm", { NULL }, { "n", "m" },
+      { "Phi", "Gamma", "Q", "H", "R", "w_bar", "x0", "P0" },
+      { "Pi", "mu0" }, { NULL }, { "z", "expected" } },
+    { "cgimm", { NULL }, { "n", "m" }, { "x0", "w0", "winf", "kc" },
+      { "T", "R", "Pi", "mu0" }, { NULL }, { "z", "expected" } },
+    { "mekf", { "model", "cb" }, { "n", "m", "r", "p1", "p2" }, { NULL },
+      { "x0", "y0", "P0", "P10", "Q", "R" },
+      { "T", "d", "C", "A0", "A1", "A2", "C0", "C1", "C2", "B1", "B2", "B3",
+        "a1", "a2", "b1", "b2", "g" },
+      { "z", "expected", "expected_ekf" } }
 };
 
 static const struct kind *kind_of(const char *name)
@@ -85,42 +93,78 @@ static const struct kind *kind_of(const char *name)
     return NULL;
 }
 
-static void put_case(const struct kind *kind, const char *dir, const char *name)
+/* The numbers of each key of a JSON object, a 0 for what is not there. */
+static void put_keys(const char *name, const char *const *key,
+                     const json_t *object)
+{
+    for (; *key != NULL; key++) {
+        printf("static const double %s_%s[] = {", name, *key);
+        if (put_numbers(json_object_get(object, *key)) == 0)
+            printf("0,");
+        printf("};\n");
+    }
+}
+
+static void put_names(const char *name, const char *const *key)
+{
+    for (; *key != NULL; key++)
+        printf("%s_%s, ", name, *key);
+}
+
+/* All tables of a case; how many rows each has. */
+static int put_tables(const char *name, const char *const *table,
+                      const char *folder)
 {
     char path[4096];
+    int i, rows = 0;
+
+    for (i = 0; table[i] != NULL; i++) {
+        int here;
+
+        snprintf(path, sizeof path, "%s/%s.csv", folder, table[i]);
+        here = put_csv(name, table[i], path);
+        if (i > 0 && here != rows)
+            fail("not as many rows as z.csv", path);
+        rows = here;
+    }
+    return rows;
+}
+
+static void put_case(const struct kind *kind, const char *dir, const char *name)
+{
+    char folder[2048], path[4096];
     json_error_t error;
     json_t *model, *modes;
     const char *const *key;
     int rows;
 
-    snprintf(path, sizeof path, "%s/%s/model.json", dir, name);
+    snprintf(folder, sizeof folder, "%s/%s", dir, name);
+    snprintf(path, sizeof path, "%s/model.json", folder);
     model = json_load_file(path, 0, &error);
     if (model == NULL)
         fail(error.text, path);
     modes = json_object_get(model, "modes");
     for (key = kind->modes; *key != NULL; key++)
         put_array(name, *key, modes);
-    for (key = kind->top; *key != NULL; key++) {
-        printf("static const double %s_%s[] = {", name, *key);
-        put_numbers(json_object_get(model, *key));
-        printf("};\n");
-    }
-    snprintf(path, sizeof path, "%s/%s/z.csv", dir, name);
-    rows = put_csv(name, "z", path);
-    snprintf(path, sizeof path, "%s/%s/expected.csv", dir, name);
-    if (put_csv(name, "expected", path) != rows)
-        fail("not as many rows as z.csv", path);
-    printf("#define CASE_%s { \"%s\", %d, %d, %d, %d, %d, ",
-           name, name, (int)json_array_size(modes),
-           (int)json_integer_value(json_object_get(model, "n")),
-           (int)json_integer_value(json_object_get(model, "m")),
-           (int)json_array_size(json_object_get(json_array_get(modes, 0), "Q")),
-           rows);
-    for (key = kind->modes; *key != NULL; key++)
-        printf("%s_%s, ", name, *key);
-    for (key = kind->top; *key != NULL; key++)
-        printf("%s_%s, ", name, *key);
-    printf("%s_z, %s_expected }\n", name, name);
+    put_keys(name, kind->top, model);
+    put_keys(name, kind->params, json_object_get(model, "params"));
+    rows = put_tables(name, kind->tables, folder);
+    printf("#define CASE_%s { \"%s\", ", name, name);
+    for (key = kind->words; *key != NULL; key++)
+        printf("\"%s\", ", json_string_value(json_object_get(model, *key)));
+    if (modes != NULL)
+        printf("%d, ", (int)json_array_size(modes));
+    for (key = kind->sizes; *key != NULL; key++)
+        printf("%d, ", (int)json_integer_value(json_object_get(model, *key)));
+    if (modes != NULL)
+        printf("%d, ", (int)json_array_size(json_object_get(
+            json_array_get(modes, 0), "Q")));
+    printf("%d, ", rows);
+    put_names(name, kind->modes);
+    put_names(name, kind->top);
+    put_names(name, kind->params);
+    put_names(name, kind->tables);
+    printf("}\n");
     json_decref(model);
 }
 
