@@ -86,9 +86,10 @@ $(BUILD)/obj/%.o: %.c $(BUILD)/flags
 $(BUILD)/obj_f32/%.o: %.c $(BUILD)/flags
 	$(call compile,$(HOST) $(FLOAT))
 
-# Fixed sizes gain by unrolling; in sections, since each program wants its own.
-SIZES := %/src/kf/kf_sizes.o
-$(SIZES): private CFLAGS += -O3 -ffunction-sections -fdata-sections
+# Fixed sizes gain by unrolling, rotations by taking several numbers at once;
+# in sections, since each program wants its own sizes.
+FAST := %/src/kf/kf_sizes.o %/src/mat/mat_givens.o
+$(FAST): private CFLAGS += -O3 -ffunction-sections -fdata-sections
 
 # Two notes that change only when what they say changes, so that other flags
 # or a source that is gone also rebuild what they concern.
