@@ -49,8 +49,9 @@ JL_INLINE void jli_givens(jl_real *A, int rows, int cols)
                 sum = length * length;
             } else {
                 length = jli_sqrt(sum);
-                c = r / length;
-                s = x / length;
+                s = 1 / length;
+                c = r * s;
+                s *= x;
             }
             r = length;
             row[j] = 0;

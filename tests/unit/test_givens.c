@@ -161,6 +161,34 @@ static void test_givens_leaves_triangles(void **state)
         assert_true(A[i] == B[i]);
 }
 
+static void test_givens_fixed_same_bits(void **state)
+{
+    static const int sizes[][2] = {
+#define JL_GIVENS_SIZE(rows, cols) { rows, cols },
+#include JL_GIVENS_SIZES_FILE
+    };
+    jl_real A[MOST * MOST], B[MOST * MOST];
+    int s, k, i;
+
+    (void)state;
+    assert_true(jl_mat_givens_fixed(2, 5) == jl_mat_givens);
+    for (s = 0; s < (int)(sizeof sizes / sizeof *sizes); s++) {
+        const int rows = sizes[s][0], cols = sizes[s][1];
+        jl_givens *fixed = jl_mat_givens_fixed(rows, cols);
+
+        assert_true(fixed != jl_mat_givens);
+        for (k = 0; k < 100; k++) {
+            draw(A, rows * cols, 1);
+            for (i = 0; i < k % 10; i++)
+                A[7 * (i + k) % (rows * cols)] = 0;
+            memcpy(B, A, sizeof B);
+            jl_mat_givens(A, rows, cols);
+            fixed(B, rows, cols);
+            assert_memory_equal(A, B, (size_t)(rows * cols) * sizeof *A);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -168,6 +196,7 @@ int main(void)
         cmocka_unit_test(test_givens_of_any_magnitude),
         cmocka_unit_test(test_givens_of_dependent_columns),
         cmocka_unit_test(test_givens_leaves_triangles),
+        cmocka_unit_test(test_givens_fixed_same_bits),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
