@@ -14,7 +14,8 @@
  *              mu_t = c_t exp(l_t) / sum of them
  *     combine  xhat = sum_t mu_t x_t
  * S = R / (1 - alpha) is exact for the gains of a Kalman filter.  A c_t below
- * 2^-54 JL_REAL_MIN may count as 0: a mode that is entered from no other may
+ * 1024 JL_REAL_MIN may count as 0, and so may a likelihood whose ratio to the
+ * best one is less than JL_REAL_MIN: a mode that is entered from no other may
  * be lost for good.
  *
  * Two modes of order 2 and 3 with steady gains, one axis: 24 multiplications
@@ -123,7 +124,7 @@ typedef struct jl_cgimm {
     jl_real *keep;              /* [M]   1 - alpha                          */
     jl_real *q;                 /* [M]   axes log(1 / 2 pi S) / 2           */
     jl_real q_more;             /* of two modes, q_0 - q_1                  */
-    jl_real *weight;            /* [M]   mu times a number of 2^54 to 2^64  */
+    jl_real *weight;            /* [M]   mu times their sum, 2^-10 to 2      */
     jl_real all, all_before, all_left;  /* sums of weights: after and before the
                                    last measurement, as kept for the next   */
     int best;                   /* likeliest mode there; -1: no measurement */

@@ -206,8 +206,9 @@ static void keep_weights(jl_cgimm *cg)
     for (j = 0; j < cg->M; j++)
         all += cg->c[j];
     for (j = 0; j < cg->M; j++)
-        cg->mu[j] = (cg->weight[j] = cg->c[j]) / all;
-    jli_cg_unweighed(cg, all);
+        cg->mu[j] = cg->c[j] / all;
+    jli_cg_weights_are_mu(cg);
+    cg->best = -1;
 }
 
 int jl_cgimm_weigh(jl_cgimm *cg, const jl_real *z)

@@ -47,10 +47,10 @@ static void start(jl_cgimm *cg, const jl_real *mu)
 
     for (j = 0; j < M; j++) {
         cg->mu[j] = mu != NULL ? mu[j] : 1 / (jl_real)M;
-        cg->weight[j] = JLI_WEIGHTS * cg->mu[j];
         jl_cgimm_restart(cg, j);
     }
-    jli_cg_unweighed(cg, JLI_WEIGHTS);
+    jli_cg_weights_are_mu(cg);
+    cg->best = -1;
     jl_cgimm_combine(cg);
 }
 
