@@ -143,10 +143,12 @@ typedef struct jl_cgimm {
  * cap >= JL_CGIMM_STATE(M, axes).  x = 0, mu uniform, gains at their start.
  * Pi [M,M], rows sum to 1.
  * Returns JL_OK, JL_EDIM (M outside 1..JL_MAX_MODES, axes outside
- * 1..JL_MAX_STATES, an order), JL_ENOMEM, JL_ENONFINITE, JL_EPROB (Pi), JL_ERANGE (T or R not above
- * 0; gains of no stable filter: alpha not in 0..1, beta not in 0..4 - 2 alpha,
- * gamma not in 0..4 alpha beta / (2 - alpha); k not in 0..1e6); *cg is
- * untouched on error. */
+ * 1..JL_MAX_STATES, an order), JL_ENOMEM, JL_ENONFINITE, JL_EPROB (Pi),
+ * JL_ERANGE (T or R not above 0; gains of no stable filter: alpha not in 0..1,
+ * beta not in 0..4 - 2 alpha, gamma not in 0..4 alpha beta / (2 - alpha); an
+ * alpha within 2 JL_EPSILON of 1, in the end or after the first measurement, as
+ * of a lambda above 3e3 in float; k not in 0..1e6); *cg is untouched on
+ * error. */
 int jl_cgimm_init(jl_cgimm *cg, int M, const jl_cg_gains *gains, int axes,
                   jl_real T, jl_real R, const jl_real *Pi, jl_real *mem,
                   int cap);

@@ -588,6 +588,9 @@ static void test_cgimm_init_refuses(void **state)
     REFUSED_GAINS(JL_ERANGE, bad[0].steady[0] = 1);
     REFUSED_GAINS(JL_ERANGE, bad[0].steady[0] = 0);
     REFUSED_GAINS(JL_ERANGE, bad[1].steady[0] = JL_C(-0.1));
+    REFUSED_GAINS(JL_ERANGE, bad[0].steady[0] = 1 - JL_EPSILON);
+    REFUSED_GAINS(JL_ERANGE, (bad[0].steady[0] = 1 - 8 * JL_EPSILON,
+                              bad[0].k[0] = 100));      /* alpha stays 1 */
     REFUSED_GAINS(JL_ERANGE, bad[0].steady[1] = 4);
     REFUSED_GAINS(JL_ERANGE, bad[0].steady[1] = 0);
     REFUSED_GAINS(JL_ERANGE, bad[1].steady[2] = 2);
@@ -596,7 +599,7 @@ static void test_cgimm_init_refuses(void **state)
     REFUSED_GAINS(JL_ERANGE, bad[0].start[0] = 0);
     REFUSED_GAINS(JL_ERANGE, bad[1].start[1] = -1);
     REFUSED_GAINS(JL_ERANGE, bad[1].k[2] = -1);
-    REFUSED_GAINS(JL_ERANGE, bad[1].k[0] = JL_C(1.0e7));        /* alpha stays 1 */
+    REFUSED_GAINS(JL_ERANGE, bad[1].k[0] = JL_C(1.0e7));
     REFUSED_GAINS(JL_ENONFINITE, bad[0].steady[0] = NAN_);
     REFUSED_GAINS(JL_ENONFINITE, bad[1].start[2] = NAN_);
     REFUSED_GAINS(JL_ENONFINITE, bad[0].k[1] = (jl_real)INFINITY);
