@@ -129,6 +129,7 @@ typedef struct jl_cgimm {
                                    last measurement, as kept for the next   */
     int best;                   /* likeliest mode there; -1: no measurement */
     jl_real best_sum;           /* its l                                    */
+    int diverged;               /* 1: a mode's l has overflowed             */
     jl_real *c;                 /* [M]   predicted weights                  */
     jl_real *l;                 /* [M]   the axes' sum of (1 - alpha) nu^2  */
     jl_real *moving;            /* [M]   0: gains are what they will be     */
@@ -164,8 +165,15 @@ int jl_cgimm_set(jl_cgimm *cg, const jl_real *x, const jl_real *mu);
 void jl_cgimm_restart(jl_cgimm *cg, int j);
 
 /* One step with z [axes]; NULL: no measurement, all is predicted, gains wait.
- * Returns JL_OK, or JL_ENONFINITE (z not finite or beyond JL_LARGE): unchanged
- * then. */
+ *
+ * Gains are those of measurements T apart.  Where for long only every n-th comes
+ * a mode's errors die out only if n beta < 4 - 2 alpha and, with order 3,
+ * n gamma < 4 alpha beta / (2 - alpha): with the paper's modes up to n = 40
+ * (CV), but 3 (CA); beyond it they grow without end.
+ *
+ * Returns JL_OK, or JL_ENONFINITE: z not finite or beyond JL_LARGE; or, from
+ * then on until jl_cgimm_set, a mode has diverged, so far that nu^2 has
+ * overflowed.  Unchanged then, and still finite. */
 int jl_cgimm_step(jl_cgimm *cg, const jl_real *z);
 
 /* The stages of a step, for filters spread over several processors (par.h):
@@ -178,7 +186,7 @@ int jl_cgimm_step(jl_cgimm *cg, const jl_real *z);
  * is NULL.  foresee may be called at any time and starts the step anew, combine
  * right after weigh only: it has what the next mixing needs.
  * filter_mode and weigh return JL_OK, JL_EORDER (filter without foresee, weigh
- * without filter), filter_mode JL_ENONFINITE (z). */
+ * without filter), filter_mode JL_ENONFINITE as jl_cgimm_step. */
 void jl_cgimm_foresee(jl_cgimm *cg);
 void jl_cgimm_mix_mode(jl_cgimm *cg, int j);
 int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z);

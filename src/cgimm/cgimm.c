@@ -56,6 +56,7 @@ static void start(jl_cgimm *cg, const jl_real *mu)
     }
     jli_cg_weights_are_mu(cg);
     cg->best = -1;
+    cg->diverged = 0;
     jl_cgimm_combine(cg);
 }
 

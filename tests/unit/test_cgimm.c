@@ -441,6 +441,42 @@ static void test_cgimm_survives_outliers(void **state)
         }
 }
 
+/* Mode 1 diverges where one measurement in twelve comes, and mode 0, which it is
+ * mixed into, with it; until then all is finite, and then it stays. */
+static void test_cgimm_tells_that_it_diverges(void **state)
+{
+    static struct rig before;
+    struct setting s = { 0, 2, { 2, 3, 3 }, 1, 50, NULL, NULL };
+    jl_real z[AXES], x[AXES * 3], again[MODES * AXES * 3] = { 0 };
+    int M, k, i, status;
+
+    (void)state;
+    for (M = 1; M <= 3; M++) {
+        s.M = M;
+        s.order[0] = M == 1 ? 3 : 2;
+        s.Pi = M == 1 ? one : M == 2 ? two : three;
+        open_rig(&rig, &s);
+        for (k = 0, status = JL_OK; status == JL_OK && k < 100000; k++) {
+            before = rig;
+            status = jl_cgimm_step(&rig.cg, k % 12 == 0 ? measured(z, &s, 0)
+                                   : NULL);
+            jl_cgimm_estimate(&rig.cg, x);
+            for (i = 0; i < 6; i++)
+                assert_true(isfinite((double)x[i]));
+            for (i = 0; i < M; i++)
+                assert_true(rig.cg.mu[i] >= 0 && rig.cg.mu[i] <= 1);
+        }
+        assert_int_equal(status, JL_ENONFINITE);
+        assert_same_bits(&rig.cg, &before.cg, sizeof rig.cg);
+        assert_same_bits(rig.mem, before.mem, sizeof rig.mem);
+        assert_int_equal(jl_cgimm_step(&rig.cg, NULL), JL_ENONFINITE);
+        jl_cgimm_foresee(&rig.cg);
+        assert_int_equal(jl_cgimm_filter_mode(&rig.cg, 0, z), JL_ENONFINITE);
+        assert_int_equal(jl_cgimm_set(&rig.cg, again, NULL), JL_OK);
+        assert_int_equal(jl_cgimm_step(&rig.cg, z), JL_OK);
+    }
+}
+
 /* 1 / c_t overflows. */
 static void test_cgimm_survives_the_least_probabilities(void **state)
 {
@@ -663,6 +699,7 @@ int main(void)
         cmocka_unit_test(test_cgimm_two_modes_are_two_of_three),
         cmocka_unit_test(test_cgimm_step_is_its_stages),
         cmocka_unit_test(test_cgimm_survives_outliers),
+        cmocka_unit_test(test_cgimm_tells_that_it_diverges),
         cmocka_unit_test(test_cgimm_survives_the_least_probabilities),
         cmocka_unit_test(test_cgimm_weights_keep_their_sum),
         cmocka_unit_test(test_cgimm_keeps_to_its_memory),
