@@ -137,13 +137,14 @@ typedef struct jl_systolic_triangle {
     int N;                      /* rows                                     */
     int delay;                  /* ticks through the diamonds: 0 or 1       */
     int noises;                 /* rows U_Q G'                              */
-    int step;                   /* the step that is being fed               */
+    int step;                   /* the step it is fed for                   */
+    int known[3], noise_known;  /* for which step the host has the rows     */
     int sent[3], block;         /* rows of products fed, of each block      */
     int rows;                   /* rows of the QR fed                       */
+    int out;                    /* elements of the estimate that are out    */
+    long launch[3];             /* of a block's first row                   */
     long busy;                  /* launch of the last Faddeev row           */
     long due;                   /* when U F' can be fed                     */
-    long done;                  /* when the row for Faddeev can be          */
-    int out;                    /* elements of the estimate that are out    */
     jl_real *map;               /* [..,N-r] rows H F, F; c f, f, c f        */
     jl_real *product;           /* [N-r,N]  U F'H', U F'                    */
     jl_real *noise;             /* [noises,N] U_Q G'H', U_Q G'              */
@@ -172,18 +173,29 @@ struct jl_systolic {
     jl_systolic_schedule schedule;
     jl_systolic_triangle left, right;
     int phase;                  /* which wires are read                     */
-    int status;                 /* what went wrong in this tick             */
-    int has_f, has_F, has_G, has_xp, has_c, has_cc;     /* for which step   */
-    int has_x, has_y, has_xhat; /* estimates: of which step                 */
-    int left_map, right_map, left_noise, right_noise;
-    int sums, differences;      /* out of the diamonds, the subtractor      */
-    jl_real *mem, *z, *f, *F, *G, *H, *cc, *cm, *xp, *sum, *UQ, *work;
+    int status;                 /* what the estimates are                   */
+    int has_x, has_y, has_xhat; /* which step's estimates are out           */
+    int has_xp, has_yp;         /* ... predictions are known                */
+    int has_f, has_F, has_G, has_c, has_cc;     /* ... matrices             */
+    int sums_of, sum_first;     /* c xp from the diamonds: of which step, of
+                                   which filter first                       */
+    int sums, differences;      /* how many are out, and what is left of z  */
+    jl_real *mem, *z, *f, *F, *G, *H, *c_A, *c_B, *xp, *xp_host, *sum, *UQ;
+    jl_real *work;
     int reals;
 };
 
-/* Reals of state, half of it to undo a step that fails. */
+/* Reals of state, half of it to undo a step that fails: the estimates and F, G,
+ * H, c; what is fed to A; and to B. */
 #define JL_SYSTOLIC_STATE(n, m, r, p1, p2) \
-    (2 * JL_SYSTOLIC_REALS(n, m, r, p1, p2))
+    (2 * (JL_SYSTOLIC_HOST(n, m, r, (p1) + (p2)) \
+          + JL_SYSTOLIC_FED((n) + (m), r, (p1) + (p2)) \
+          + JL_SYSTOLIC_FED(n, r, p1)))
+#define JL_SYSTOLIC_HOST(n, m, r, p) \
+    ((n) * ((n) + 1) + (p) * (p) + (r) * (2 * (n) + 3) \
+     + ((n) + (m)) * (2 * ((n) + (m)) + 2 * (p) + 2 * (r) + 3) + (r) * (r))
+#define JL_SYSTOLIC_FED(n, r, p) \
+    (((n) + 2 * (r)) * (n) + ((n) + (p)) * ((n) + (r)))
 
 /* Bind an array to its memory and give it a filter's state, factors, model and
  * choice of c; the filter may go, its model must not.

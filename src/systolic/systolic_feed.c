@@ -1,0 +1,267 @@
+/* Which row is fed to the array in which tick.
+ *
+ * A row that is launched in tick t is a wavefront: it enters column j in tick
+ * t + j, since what it meets there comes from the west one column a tick, and
+ * cell (i,j) works on it in tick t + i + j (a tick later below the diamonds).
+ * Products that enter column r at row i in a tick count as launched r + i ticks
+ * before it: so two rows cannot meet if no two have the same launch, and what
+ * follows is all there is to know.
+ *
+ *   - Estimates leave row r - 1: that of column j in tick t + r + j.  From them
+ *     come F, and so the products' launch.
+ *   - U F' leaves row i of N in the east: t + i + N (+ 1 if there are diamonds),
+ *     column k of it k ticks after the first, just as row i wants it back at the
+ *     north.  So that row can be launched when its first element is out, or
+ *     when the last one will be in time, t >= launch of k - k + i + N.
+ *   - Sums leave the diamonds in tick t + n + 2 r, differences one later.
+ *   - The QR must not overtake the products, which need U; the estimate, not the
+ *     QR; and products of the next step, not the estimate: they are launched in
+ *     this order.  But the first row of the QR enters at row 0, and products
+ *     enter at row r: it may enter before them if they have the earlier launch.
+ *
+ * So a step takes, from the row for Faddeev of A to the next, with Q first:
+ *     m - 1, F waits for ybar ([y; x]);  n + m, F;  r, H F
+ *     n + m + 2 r from the first of H F to the first row U F' (or until the
+ *         n + m rows U_Q G' are in, whichever is more);  n + m, U F'
+ * or, where H is what all waits for, 2 n - 1 from f to H F (n rows f, and n - 1
+ * ticks from there to the last sum of f xhat). */
+#include "systolic/systolic_parts.h"
+
+/* feed of a cell: 1 .. rows for a row of the QR, rows + 1 for the Faddeev row,
+ * above that a row of products by its tag. */
+static int qr_rows(const jl_systolic *array, const jl_systolic_triangle *t)
+{
+    return t->noises + t->N - array->r;
+}
+
+/* --- products --------------------------------------------------------------- */
+
+/* The rows of products not fed yet; *all_known: they could be one after another. */
+static int remaining(int *all_known, const jl_systolic *array,
+                     const jl_systolic_triangle *t)
+{
+    int rows = 0, b;
+
+    *all_known = 1;
+    for (b = 0; b < 3; b++) {
+        int more = JLI_BLOCK_ROWS(t, array->r, b) - t->sent[b];
+
+        rows += more;
+        if (more > 0 && t->known[b] < t->step)
+            *all_known = 0;
+    }
+    return rows;
+}
+
+/* The block of which a row can be fed now; -1: none. */
+static int choose_block(const jl_systolic *array, const jl_systolic_triangle *t)
+{
+    static const int orders[3][3] = {
+        { JLI_SENSE, JLI_MOVE, JLI_PREDICT }, { JLI_MOVE, JLI_SENSE, JLI_PREDICT },
+        { JLI_MOVE, JLI_SENSE, JLI_PREDICT }
+    };
+    int rule = array->schedule.products, i;
+    const int *order = orders[t->delay ? 2
+                              : rule == JL_SYSTOLIC_F_FIRST ? 1 : 0];
+
+    if (t->block >= 0 && (t->delay || rule != JL_SYSTOLIC_ROWS)
+        && t->sent[t->block] < JLI_BLOCK_ROWS(t, array->r, t->block))
+        return t->block;
+    for (i = 0; i < 3; i++) {
+        int b = order[i];
+
+        if (t->sent[b] == JLI_BLOCK_ROWS(t, array->r, b))
+            continue;
+        if (t->known[b] >= t->step)
+            return b;
+        if (!t->delay && rule == JL_SYSTOLIC_F_FIRST)
+            break;
+    }
+    return -1;
+}
+
+/* Launch a row of products, which enters the array in this tick. */
+static void launch_product(jl_systolic *array, jl_systolic_triangle *t,
+                           int port, int depth)
+{
+    long launch = array->tick - depth;
+    int n = array->n, r = array->r, block, tag;
+
+    if (launch <= t->busy)
+        return;
+    /* What B predicts is A's, too: has A taken what was predicted before? */
+    if (t->delay && (array->left.step < t->step
+                     || launch + n + 2 * r < array->left.busy + array->left.N))
+        return;
+    block = choose_block(array, t);
+    if (block < 0)
+        return;
+    if (t->delay && array->sums_of < t->step) {
+        array->sums_of = t->step;
+        array->sums = array->differences = 0;
+    }
+    tag = JLI_BLOCK_TAG(t, r, block) + t->sent[block];
+    if (t->sent[block]++ == 0)
+        t->launch[block] = launch;
+    t->block = block;
+    if (tag < t->N && launch - tag + r + t->N + t->delay > t->due)
+        t->due = launch - tag + r + t->N + t->delay;
+    array->cell[port].feed = qr_rows(array, t) + 2 + tag;
+}
+
+/* --- rows of the QR, and the one for Faddeev ------------------------------- */
+
+static int noise_row(const jl_systolic *array, const jl_systolic_triangle *t,
+                     int row)
+{
+    if (array->schedule.noise_first)
+        return row < t->noises ? row : -1;
+    return row - (t->N - array->r);
+}
+
+static int can_rotate(const jl_systolic *array, const jl_systolic_triangle *t,
+                      int depth)
+{
+    int all_known, more = remaining(&all_known, array, t);
+
+    if (!all_known || more >= depth)
+        return 0;
+    /* What the last QR left must last until the step's end (cov). */
+    if (t->delay && t->step > array->step + 1)
+        return 0;
+    if (noise_row(array, t, t->rows) >= 0)
+        return t->noise_known >= t->step;
+    return more == 0 && array->tick >= t->due
+        + (t->rows - (array->schedule.noise_first ? t->noises : 0));
+}
+
+/* Will the k-th difference, and the k-th prediction, be there in tick + k and in
+ * tick + r + k? */
+static int can_correct(const jl_systolic *array, const jl_systolic_triangle *t)
+{
+    int n = array->n, r = array->r, b = t->delay ? JLI_SENSE : JLI_PREDICT;
+    const jl_systolic_triangle *B = &array->right;
+    int is_over = B->step > t->step;
+    long later = !t->delay && array->schedule.y_first ? array->m : 0;
+
+    if (array->sums_of != t->step || array->step + 1 < t->step
+        || array->has_yp < t->step)
+        return 0;
+    if (array->differences < 2 * r
+        && ((B->sent[b] < r && !is_over)
+            || array->sums > array->differences + 1
+            || array->tick < B->launch[b] + n + 2 * r + 1))
+        return 0;
+    return (B->sent[JLI_MOVE] == n || is_over)
+        && array->tick + r + later >= B->launch[JLI_MOVE] + n + 2 * r;
+}
+
+static void launch_row(jl_systolic *array, jl_systolic_triangle *t, int depth)
+{
+    int rows = qr_rows(array, t);
+
+    if (t->rows < rows) {
+        if (can_rotate(array, t, depth))
+            array->cell[t->first].feed = ++t->rows;
+    } else if (can_correct(array, t)) {
+        array->cell[t->first].feed = rows + 1;
+        t->busy = array->tick;
+        t->step++;
+        t->rows = t->out = 0;
+        t->sent[0] = t->sent[1] = t->sent[2] = 0;
+        t->block = -1;
+        t->due = 0;
+    }
+}
+
+/* --- elements --------------------------------------------------------------- */
+
+static void put_element(jl_systolic *array, const jl_systolic_triangle *t,
+                        jl_systolic_cell *cell)
+{
+    int r = array->r, inside = t->N - r, rows = qr_rows(array, t);
+    int j = cell->column, row = cell->feed - 1;
+    jl_systolic_packet *p = &cell->host;
+
+    p->tag = 0;
+    p->b = 0;
+    if (row < 0) {
+        p->mode = JL_SYSTOLIC_IDLE;
+        p->a = 0;
+    } else if (row < rows) {
+        int k = noise_row(array, t, row);
+        int u = array->schedule.noise_first ? row - t->noises : row;
+
+        p->mode = JL_SYSTOLIC_QR;
+        p->tag = (row == 0 ? JLI_FIRST : 0) | (row == rows - 1 ? JLI_LAST : 0);
+        p->a = k >= 0 ? t->noise[k * t->N + j] : t->product[u * t->N + j];
+    } else if (row == rows) {
+        p->mode = JL_SYSTOLIC_FADDEEV;
+        if (j < r)
+            p->a = array->sum[(t->delay ? r : 0) + j];
+        else
+            p->a = array->xp[t->delay ? j - r : JLI_STATE_OF(array, j - r)];
+    } else {
+        p->mode = JL_SYSTOLIC_MULTIPLY;
+        p->tag = row - rows - 1;
+        p->a = t->map[p->tag * inside + j - r];
+    }
+}
+
+/* A row goes on to the next column.  first: a cell of column `column`, and those
+ * east of it. */
+static void shift(jl_systolic *array, int first, int columns)
+{
+    int j;
+
+    for (j = columns - 1; j > 0; j--)
+        array->cell[first + j].feed = array->cell[first + j - 1].feed;
+    array->cell[first].feed = 0;
+}
+
+static void put_elements(jl_systolic *array, const jl_systolic_triangle *t,
+                         int first, int columns)
+{
+    int j;
+
+    for (j = 0; j < columns; j++)
+        put_element(array, t, array->cell + first + j);
+}
+
+static void feed_triangle(jl_systolic *array, jl_systolic_triangle *t,
+                          int launch)
+{
+    int r = array->r, inside = array->schedule.inside;
+    int depth = inside ? 2 * r : r, n = t->N - r;
+    int port = !inside ? t->first + r
+        : t->delay ? JLI_DIAMOND(array, r) : JLI_CELL(t, r, r);
+
+    shift(array, t->first, t->N);
+    if (inside)
+        shift(array, port, n);
+    if (launch) {
+        launch_product(array, t, port, depth);
+        launch_row(array, t, depth);
+    }
+    put_elements(array, t, t->first, t->N);
+    if (inside)
+        put_elements(array, t, port, n);
+}
+
+void jli_systolic_feed(jl_systolic *array, int launch)
+{
+    jl_systolic_packet *p = &array->cell[JLI_SUBTRACTOR(array)].host;
+    int d = array->differences, r = array->r;
+
+    feed_triangle(array, &array->left, launch);
+    feed_triangle(array, &array->right, launch);
+    p->mode = JL_SYSTOLIC_IDLE;
+    if (array->sums > d && array->sums_of <= array->step + 1) {
+        int first = array->sum_first;
+
+        p->mode = JL_SYSTOLIC_SUBTRACT;
+        p->tag = (d < r ? first : 1 - first) * r + d % r;
+        p->a = array->sum[p->tag];
+        p->b = array->z[d % r];
+    }
+}
