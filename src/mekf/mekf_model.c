@@ -36,7 +36,7 @@ static int fx(jl_real *out, const jl_real *y, void *context)
 
     status = model->f(zeros(part->matrix, n * n), y, model->context);
     jli_apply(out, part->matrix, part->x, NULL, n, n);
-    return status;
+    return jli_checked(status, part->matrix, n * n);
 }
 
 /* h(x, y) of [x; y] */
@@ -53,10 +53,9 @@ static int cx(jl_real *out, const jl_real *at, void *context)
 {
     const struct part *part = context;
     const jl_mekf_model *model = part->model;
-    int n = model->n, r = model->r, status;
+    int status = jli_mekf_c(part->matrix, model, at, at + model->n);
 
-    status = model->c(zeros(part->matrix, r * n), at, at + n, model->context);
-    jli_apply(out, part->matrix, at, NULL, r, n);
+    jli_apply(out, part->matrix, at, NULL, model->r, model->n);
     return status;
 }
 

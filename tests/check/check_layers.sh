@@ -30,7 +30,7 @@ port             include/jumplink/base.h include/jumplink/chan.h include/jumplin
 sim              include/ sim/ PORT_HEADERS GENERATED
 tests            include/ src/ sim/ tests/ PORT_HEADERS GENERATED
 tests/unit       include/ src/base/ tests/close.h OWN
-tests/golden     include/ tests/close.h OWN GENERATED
+tests/golden     include/ sim/mekf_zoo.h tests/close.h OWN GENERATED
 '
 
 # System headers: which of them a folder may include.  A star: any but those
