@@ -36,21 +36,16 @@ static int qr_rows(const jl_systolic *array, const jl_systolic_triangle *t)
 
 /* --- products --------------------------------------------------------------- */
 
-/* The rows of products not fed yet; *all_known: they could be one after another. */
-static int remaining(int *all_known, const jl_systolic *array,
-                     const jl_systolic_triangle *t)
+/* Rows of a block that are not fed yet. */
+static int left_of(const jl_systolic *array, const jl_systolic_triangle *t,
+                   int block)
 {
-    int rows = 0, b;
+    return JLI_BLOCK_ROWS(t, array->r, block) - t->sent[block];
+}
 
-    *all_known = 1;
-    for (b = 0; b < 3; b++) {
-        int more = JLI_BLOCK_ROWS(t, array->r, b) - t->sent[b];
-
-        rows += more;
-        if (more > 0 && t->known[b] < t->step)
-            *all_known = 0;
-    }
-    return rows;
+static int remaining(const jl_systolic *array, const jl_systolic_triangle *t)
+{
+    return left_of(array, t, 0) + left_of(array, t, 1) + left_of(array, t, 2);
 }
 
 /* The block of which a row can be fed now; -1: none. */
@@ -65,12 +60,12 @@ static int choose_block(const jl_systolic *array, const jl_systolic_triangle *t)
                               : rule == JL_SYSTOLIC_F_FIRST ? 1 : 0];
 
     if (t->block >= 0 && (t->delay || rule != JL_SYSTOLIC_ROWS)
-        && t->sent[t->block] < JLI_BLOCK_ROWS(t, array->r, t->block))
+        && left_of(array, t, t->block) > 0)
         return t->block;
     for (i = 0; i < 3; i++) {
         int b = order[i];
 
-        if (t->sent[b] == JLI_BLOCK_ROWS(t, array->r, b))
+        if (left_of(array, t, b) == 0)
             continue;
         if (t->known[b] >= t->step)
             return b;
@@ -119,19 +114,37 @@ static int noise_row(const jl_systolic *array, const jl_systolic_triangle *t,
     return row - (t->N - array->r);
 }
 
+/* Will the products that are still to come have been launched before this tick,
+ * one after another? */
+static int products_precede(const jl_systolic *array,
+                            const jl_systolic_triangle *t, int depth)
+{
+    int more = remaining(array, t), b;
+    long next = array->tick + 1 - depth;
+
+    if (more == 0)
+        return 1;
+    if (t->delay && array->sums_of < t->step)
+        return 0;                       /* B waits for A */
+    for (b = 0; b < 3; b++)
+        if (left_of(array, t, b) > 0 && t->known[b] < t->step)
+            return 0;
+    if (next <= t->busy)
+        next = t->busy + 1;
+    return next + more <= array->tick;
+}
+
 static int can_rotate(const jl_systolic *array, const jl_systolic_triangle *t,
                       int depth)
 {
-    int all_known, more = remaining(&all_known, array, t);
-
-    if (!all_known || more >= depth)
+    if (!products_precede(array, t, depth))
         return 0;
     /* What the last QR left must last until the step's end (cov). */
     if (t->delay && t->step > array->step + 1)
         return 0;
     if (noise_row(array, t, t->rows) >= 0)
         return t->noise_known >= t->step;
-    return more == 0 && array->tick >= t->due
+    return remaining(array, t) == 0 && array->tick >= t->due
         + (t->rows - (array->schedule.noise_first ? t->noises : 0));
 }
 

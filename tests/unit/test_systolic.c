@@ -41,6 +41,11 @@ static jl_real bent(jl_real x)
     return x / (1 + x * x);
 }
 
+static jl_real slope(jl_real x)         /* of bent */
+{
+    return (1 - x * x) / ((1 + x * x) * (1 + x * x));
+}
+
 static int odd_f(jl_real *f, const jl_real *y, void *context)
 {
     const struct odd *odd = context;
@@ -52,6 +57,19 @@ static int odd_f(jl_real *f, const jl_real *y, void *context)
             f[i * n + j] = (i == j ? JL_C(0.7) : 0)
                 + scatter(i, j, 1) * (JL_C(0.2) + by_y * bent(y[(i + j) % m]))
                 / (jl_real)n;
+    return JL_OK;
+}
+
+static int odd_df(jl_real *J, const jl_real *x, const jl_real *y, void *context)
+{
+    const struct odd *odd = context;
+    int n = odd->model.n, m = odd->model.m, i, j;
+    jl_real by_y = odd->constant & JL_SYSTOLIC_KNOW_F ? 0 : JL_C(0.3);
+
+    for (i = 0; i < n; i++)
+        for (j = 0; j < n; j++)
+            J[i * m + (i + j) % m] += scatter(i, j, 1) * by_y
+                * slope(y[(i + j) % m]) / (jl_real)n * x[j];
     return JL_OK;
 }
 
@@ -69,6 +87,25 @@ static int odd_h(jl_real *y_next, const jl_real *x, const jl_real *y,
     return JL_OK;
 }
 
+static int odd_dh(jl_real *J, const jl_real *x, const jl_real *y, void *context)
+{
+    const struct odd *odd = context;
+    int n = odd->model.n, m = odd->model.m, i;
+
+    for (i = 0; i < m; i++) {
+        jl_real *row = J + i * (n + m), other = y[(i + 1) % m];
+        jl_real d = JL_C(0.2) * slope(x[i % n] * other);
+
+        row[n + i] += JL_C(0.9);
+        row[i % n] += JL_C(0.1);
+        if (!(odd->constant & JL_SYSTOLIC_KNOW_F)) {
+            row[i % n] += d * other;
+            row[n + (i + 1) % m] += d * x[i % n];
+        }
+    }
+    return JL_OK;
+}
+
 static int odd_c(jl_real *c, const jl_real *x, const jl_real *y, void *context)
 {
     const struct odd *odd = context;
@@ -79,6 +116,25 @@ static int odd_c(jl_real *c, const jl_real *x, const jl_real *y, void *context)
         for (j = 0; j < n; j++)
             c[i * n + j] = (i % n == j ? 1 : 0) + JL_C(0.3) * scatter(i, j, 2)
                 + by * bent(x[(i + j) % n] + y[i % m]);
+    return JL_OK;
+}
+
+static int odd_dc(jl_real *J, const jl_real *x, const jl_real *y, void *context)
+{
+    const struct odd *odd = context;
+    int n = odd->model.n, m = odd->model.m, r = odd->model.r, i, j;
+    jl_real by = odd->constant & JL_SYSTOLIC_KNOW_C ? 0 : JL_C(0.3);
+    jl_real c[MAX_R * MAX];
+
+    odd_c(c, x, y, context);
+    for (i = 0; i < r; i++)
+        for (j = 0; j < n; j++) {
+            jl_real d = by * slope(x[(i + j) % n] + y[i % m]) * x[j];
+
+            J[i * (n + m) + j] += c[i * n + j];
+            J[i * (n + m) + (i + j) % n] += d;
+            J[i * (n + m) + n + i % m] += d;
+        }
     return JL_OK;
 }
 
@@ -119,6 +175,9 @@ static void make(struct odd *odd, int n, int m, int r, int p1, int p2,
     odd->model.h = odd_h;
     odd->model.c = odd_c;
     odd->model.G = odd_G;
+    odd->model.df = odd_df;
+    odd->model.dh = odd_dh;
+    odd->model.dc = odd_dc;
     odd->model.context = odd;
 }
 
