@@ -104,31 +104,34 @@ enum {
 };
 enum { JL_SYSTOLIC_F_FIRST, JL_SYSTOLIC_BLOCKS, JL_SYSTOLIC_ROWS };
 
-/* Ticks a step in the steady state, p1 = n, p2 = m, where B is not slower (it is
- * if n > 3 m + r or r > n + m):
+/* Ticks of a step in the steady state, counted with p1 = n, p2 = m, n to 8, m and
+ * r to 5, by the tests:
  *     paper  all is known ahead, so right for linear models only
- *                                                          3n + 3m + 2r + 1
+ *                3n + 3m + 2r + 1, where r <= n + m
  *     naive  [x; y], rows U F' first, products through row 0
- *                                                          6n + 4m + 4r - 2
+ *                6n + 4m + 4r - 2
  *     best   [y; x], rows U_Q G' first, products at row r, in blocks
- *                                   max(3n + 4m + 2r - 1, 4n + 3m + 2r - 2)
- *            with KNOW_C and _G added          max(1, m - 1) + 3n + 3m + r
- *     mixed  best, but with JL_SYSTOLIC_ROWS                                 */
+ *                max(max(1, m-1) + 3n + 3m + 2r, 4n + 3m + 2r - 2), where r < n + m
+ *                (n = m = r = 1: 8)
+ *            with JL_SYSTOLIC_KNOW_C and _G added
+ *                max(1, m-1) + 3n + 3m + r, where r <= n, r <= m, n <= 2m
+ *     mixed  best, but with JL_SYSTOLIC_ROWS: a tick less where m > n/2 or so
+ * Elsewhere B is the slower one, or waits for G, and steps may take turns. */
 extern const jl_systolic_schedule jl_systolic_paper;
 extern const jl_systolic_schedule jl_systolic_naive;
 extern const jl_systolic_schedule jl_systolic_best;
 extern const jl_systolic_schedule jl_systolic_mixed;
 
-/* What the paper counts for a step: it lets rows of products follow each other
- * through the feedback with no tick between two steps. */
+/* What the paper counts for a step.  In a machine with a register on every wire
+ * the first row of products follows the Faddeev row, a tick later. */
 #define JL_SYSTOLIC_PAPER_TICKS(n, m, r) (3 * (n) + 3 * (m) + 2 * (r))
 
 /* --- the machine ------------------------------------------------------------- */
 
 typedef struct jl_systolic jl_systolic;
 
-/* Called at the end of every tick: tick counts from 1, each cell has what it did
- * in cell[].mode. */
+/* Called at the end of every tick, of which array->tick is the number, from 1;
+ * what each cell did is in array->cell[].mode. */
 typedef void (*jl_systolic_trace)(const jl_systolic *array, void *context);
 
 /* A triangle and what is fed to it; the library's own. */
@@ -163,7 +166,7 @@ struct jl_systolic {
     jl_systolic_cell *cell;     /* [cells]                                  */
     int step;                   /* steps done                               */
     long tick;                  /* ticks done                               */
-    long count[JL_SYSTOLIC_MODES];      /* cell-ticks of each mode          */
+    long count[JL_SYSTOLIC_MODES];      /* cell-ticks of each mode, idle too */
     jl_real *x;                 /* [n+m] xbar, ybar                         */
     jl_real *xhat;              /* [n]                                      */
 
@@ -209,9 +212,10 @@ int jl_systolic_init(jl_systolic *array, const jl_mekf *filter,
                      jl_systolic_cell *cell, int cap_cells, jl_real *mem,
                      int cap);
 
-/* Ticks until the estimates of a step with z [r] are out.  By then the rows of
- * the next one are on their way.  Same estimates as jl_mekf_step, but for
- * rounding, and the same codes; all is unchanged then. */
+/* Ticks until the estimates of a step with z [r] are out.  By then rows of the
+ * next one are on their way.  Same estimates as jl_mekf_step, but for rounding,
+ * and the same codes, and JL_ERANGE for z NULL: there is no step without a
+ * measurement.  All is unchanged then, though trace has seen the ticks. */
 int jl_systolic_step(jl_systolic *array, const jl_real *z);
 
 /* P = U'U [n+m,n+m] of A; P1 [n,n] of B; NULL for what is not wanted.  Of the

@@ -192,6 +192,8 @@ int jl_systolic_step(jl_systolic *array, const jl_real *z)
     jl_systolic before = *array;
     int status;
 
+    if (z == NULL)
+        return JL_ERANGE;
     if (!jl_vec_within(z, array->r, JL_LARGE))
         return JL_ENONFINITE;
     copy_memory(array, 1, 0);

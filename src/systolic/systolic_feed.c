@@ -37,7 +37,7 @@ static int qr_rows(const jl_systolic *array, const jl_systolic_triangle *t)
 /* --- products --------------------------------------------------------------- */
 
 /* Rows of a block that are not fed yet. */
-static int left_of(const jl_systolic *array, const jl_systolic_triangle *t,
+static int to_come(const jl_systolic *array, const jl_systolic_triangle *t,
                    int block)
 {
     return JLI_BLOCK_ROWS(t, array->r, block) - t->sent[block];
@@ -45,7 +45,7 @@ static int left_of(const jl_systolic *array, const jl_systolic_triangle *t,
 
 static int remaining(const jl_systolic *array, const jl_systolic_triangle *t)
 {
-    return left_of(array, t, 0) + left_of(array, t, 1) + left_of(array, t, 2);
+    return to_come(array, t, 0) + to_come(array, t, 1) + to_come(array, t, 2);
 }
 
 /* The block of which a row can be fed now; -1: none. */
@@ -60,12 +60,12 @@ static int choose_block(const jl_systolic *array, const jl_systolic_triangle *t)
                               : rule == JL_SYSTOLIC_F_FIRST ? 1 : 0];
 
     if (t->block >= 0 && (t->delay || rule != JL_SYSTOLIC_ROWS)
-        && left_of(array, t, t->block) > 0)
+        && to_come(array, t, t->block) > 0)
         return t->block;
     for (i = 0; i < 3; i++) {
         int b = order[i];
 
-        if (left_of(array, t, b) == 0)
+        if (to_come(array, t, b) == 0)
             continue;
         if (t->known[b] >= t->step)
             return b;
@@ -127,7 +127,7 @@ static int products_precede(const jl_systolic *array,
     if (t->delay && array->sums_of < t->step)
         return 0;                       /* B waits for A */
     for (b = 0; b < 3; b++)
-        if (left_of(array, t, b) > 0 && t->known[b] < t->step)
+        if (to_come(array, t, b) > 0 && t->known[b] < t->step)
             return 0;
     if (next <= t->busy)
         next = t->busy + 1;

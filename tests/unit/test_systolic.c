@@ -22,8 +22,9 @@
 struct odd {
     jl_mekf_model model;
     int constant;                       /* JL_SYSTOLIC_KNOW_* that holds    */
-    int fails;                          /* G's code from its call on        */
-    int calls;
+    int fails;                          /* G does                           */
+    const jl_real *f_fails;             /* f does, at this y[0]             */
+    int f_calls;                        /* ... so many times                */
 };
 
 /* A number in [-1, 1) that depends on i, j, k only. */
@@ -48,10 +49,14 @@ static jl_real slope(jl_real x)         /* of bent */
 
 static int odd_f(jl_real *f, const jl_real *y, void *context)
 {
-    const struct odd *odd = context;
+    struct odd *odd = context;
     int n = odd->model.n, m = odd->model.m, i, j;
     jl_real by_y = odd->constant & JL_SYSTOLIC_KNOW_F ? 0 : JL_C(0.3);
 
+    if (odd->f_fails != NULL && fabs((double)(y[0] - *odd->f_fails)) < 1e-5) {
+        odd->f_calls++;
+        return JL_ETIME;
+    }
     for (i = 0; i < n; i++)
         for (j = 0; j < n; j++)
             f[i * n + j] = (i == j ? JL_C(0.7) : 0)
@@ -141,12 +146,12 @@ static int odd_dc(jl_real *J, const jl_real *x, const jl_real *y, void *context)
 static int odd_G(jl_real *G1, jl_real *G2, jl_real *G3, const jl_real *x,
                  const jl_real *y, void *context)
 {
-    struct odd *odd = context;
+    const struct odd *odd = context;
     int n = odd->model.n, m = odd->model.m, p1 = odd->model.p1;
     int p2 = odd->model.p2, i, j;
     jl_real by = odd->constant & JL_SYSTOLIC_KNOW_G ? 0 : JL_C(0.2);
 
-    if (odd->fails > 0 && ++odd->calls >= odd->fails)
+    if (odd->fails)
         return JL_ERANGE;
     for (i = 0; i < n; i++)
         for (j = 0; j < p1; j++)
@@ -240,9 +245,10 @@ static void measure(jl_real *z, int r, int step)
         z[i] = scatter(i, step, 8);
 }
 
-static double largest(const jl_real *v, int n)
+/* The largest of v, or at least `least`. */
+static double largest(const jl_real *v, int n, double least)
 {
-    double most = 1e-300;
+    double most = least;
     int i;
 
     for (i = 0; i < n; i++)
@@ -250,9 +256,9 @@ static double largest(const jl_real *v, int n)
     return most;
 }
 
-static void assert_near(const jl_real *a, const jl_real *b, int n)
+static void assert_near(const jl_real *a, const jl_real *b, int n, double least)
 {
-    double unit = largest(b, n);
+    double unit = largest(b, n, least);
     int i;
 
     for (i = 0; i < n; i++)
@@ -267,12 +273,12 @@ static void assert_same_filter(void)
     jl_real want[4 * MAX * MAX], want1[MAX * MAX];
     int n = filter.model->n, N = n + filter.model->m;
 
-    assert_near(array.x, filter.x, N);
-    assert_near(array.xhat, filter.xhat, n);
+    assert_near(array.x, filter.x, N, 1);
+    assert_near(array.xhat, filter.xhat, n, 1);
     jl_systolic_cov(&array, P, P1);
     jl_mekf_cov(&filter, want, want1);
-    assert_near(P, want, N * N);
-    assert_near(P1, want1, n * n);
+    assert_near(P, want, N * N, 0);
+    assert_near(P1, want1, n * n, 0);
 }
 
 static void compare(struct odd *odd, const jl_systolic_schedule *schedule,
@@ -369,29 +375,347 @@ static long count(int n, int m, int r, const jl_systolic_schedule *preset,
     return ticks_of(&odd, &schedule, work);
 }
 
-static void test_systolic_prints(void **state)
+/* The paper's table of what a step is: cells of each kind times rows. */
+static long paper_work(long n, long m, long r)
 {
+    long N = n + m;
+
+    return (N + r) * (N + r + 1) / 2 * 2 * N + r * (2 * N + r + 1) / 2
+        + N * (N + 1) / 2 * (N + r)
+        + (n + r) * (n + r + 1) / 2 * 2 * n + r * (2 * n + r + 1) / 2
+        + n * (n + 1) / 2 * (2 * r + n) + n * (n + 2 * r);
+}
+
+static const int ALL = JL_SYSTOLIC_KNOW_F + JL_SYSTOLIC_KNOW_C
+    + JL_SYSTOLIC_KNOW_G;
+static const int C_AND_G = JL_SYSTOLIC_KNOW_C + JL_SYSTOLIC_KNOW_G;
+
+static void test_systolic_counts_of_table(void **state)
+{
+    static const struct row {
+        int n, m, r, cells, paper, percent, best, constant, mixed;
+    } rows[] = {
+        { 1, 1, 1, 11, 8, 57, 8, 8, 8 }, { 3, 2, 2, 47, 19, 63, 20, 18, 20 },
+        { 4, 2, 2, 62, 22, 66, 24, 21, 24 }, { 2, 4, 1, 37, 20, 73, 23, 22, 22 },
+        { 4, 4, 4, 119, 32, 58, 35, 31, 34 }, { 8, 4, 4, 223, 44, 67, 50, 43, 50 }
+    };
     int i;
+
     (void)state;
-    for (i = 0; i < 6; i++) {
+    for (i = 0; i < (int)(sizeof rows / sizeof *rows); i++) {
+        const struct row *w = rows + i;
+        int n = w->n, m = w->m, r = w->r;
+        long work, steps = JL_SYSTOLIC_PAPER_TICKS(n, m, r);
+
+        assert_int_equal(JL_SYSTOLIC_CELLS(n, m, r), w->cells);
+        assert_int_equal(steps, w->paper);
+        assert_int_equal(count(n, m, r, &jl_systolic_paper, ALL, &work),
+                         steps + 1);
+        assert_int_equal(work, paper_work(n, m, r));
+        assert_int_equal((200 * work / (w->cells * steps) + 1) / 2, w->percent);
+        assert_int_equal(count(n, m, r, &jl_systolic_best, 0, &work), w->best);
+        assert_int_equal(work, paper_work(n, m, r));
+        assert_int_equal(count(n, m, r, &jl_systolic_best, C_AND_G, &work),
+                         w->constant);
+        assert_int_equal(count(n, m, r, &jl_systolic_mixed, 0, &work),
+                         w->mixed);
+    }
+}
+
+static int larger(int a, int b)
+{
+    return a > b ? a : b;
+}
+
+static void test_systolic_counts_of_formulas(void **state)
+{
+    int n, m, r;
+
+    (void)state;
+    for (n = 1; n <= 8; n++)
+        for (m = 1; m <= 5; m++)
+            for (r = 1; r <= 5; r++) {
+                int base = larger(1, m - 1) + 3 * n + 3 * m + r;
+                long work;
+
+                assert_int_equal(count(n, m, r, &jl_systolic_naive, 0, &work),
+                                 6 * n + 4 * m + 4 * r - 2);
+                assert_int_equal(work, paper_work(n, m, r));
+                if (r <= n + m)
+                    assert_int_equal(count(n, m, r, &jl_systolic_paper, ALL,
+                                           &work), 3 * n + 3 * m + 2 * r + 1);
+                if (r < n + m && n + m + r > 3)
+                    assert_int_equal(count(n, m, r, &jl_systolic_best, 0, &work),
+                                     larger(base + r,
+                                            4 * n + 3 * m + 2 * r - 2));
+                if (r <= n && r <= m && n <= 2 * m)
+                    assert_int_equal(count(n, m, r, &jl_systolic_best, C_AND_G,
+                                           &work), base);
+            }
+}
+
+/* --- cells ------------------------------------------------------------------------ */
+
+/* What happened, tick by tick: cells of a mode, the left array's first feed since
+ * the last estimate, that estimate. */
+struct seen {
+    long ticks, modes[JL_SYSTOLIC_MODES], first, last, latency;
+    int last_column;
+};
+
+static void see(const jl_systolic *a, void *context)
+{
+    struct seen *seen = context;
+    int i;
+
+    seen->ticks++;
+    assert_int_equal(a->tick, seen->ticks);
+    for (i = 0; i < a->cells; i++) {
+        const jl_systolic_cell *c = a->cell + i;
+
+        seen->modes[c->mode]++;
+        if (c->part != JL_SYSTOLIC_LEFT)
+            continue;
+        if (c->column == 0 && c->mode == JL_SYSTOLIC_QR && seen->first <= seen->last)
+            seen->first = a->tick;
+        if (c->row == a->r - 1 && c->column == seen->last_column
+            && c->mode == JL_SYSTOLIC_FADDEEV) {
+            seen->latency = a->tick - seen->first + 1;
+            seen->last = a->tick;
+        }
+    }
+}
+
+static void test_systolic_trace_sees_all(void **state)
+{
+    int i, k;
+
+    (void)state;
+    for (i = 0; i < SIZES; i++) {
         const int *s = sizes[i];
-        long w;
-        int j;
-        print_message("%d %d %d: cells %d", s[0], s[1], s[2], JL_SYSTOLIC_CELLS(s[0], s[1], s[2]));
-        print_message(" paper %ld (%d)", count(s[0], s[1], s[2], &jl_systolic_paper, 7, &w), 3*s[0]+3*s[1]+2*s[2]+1);
-        print_message(" util %.3f", (double)w / JL_SYSTOLIC_CELLS(s[0], s[1], s[2]) / (3*s[0]+3*s[1]+2*s[2]));
-        print_message(" naive %ld (%d)", count(s[0], s[1], s[2], &jl_systolic_naive, 0, &w), 6*s[0]+4*s[1]+4*s[2]-2);
-        for (j = BEST; j <= MIXED; j++)
-        print_message(" best %ld const %ld", count(s[0], s[1], s[2], schedules[j], 0, &w), count(s[0], s[1], s[2], schedules[j], 6, &w));
-        print_message("\n");
+        struct seen seen = { 0 };
+        struct odd odd;
+        jl_real z[MAX_R];
+
+        make(&odd, s[0], s[1], s[2], s[0], s[1], 0);
+        start(&odd, JL_MEKF_PREV);
+        assert_int_equal(start_array(&jl_systolic_naive), JL_OK);
+        array.trace = see;
+        array.context = &seen;
+        seen.last_column = s[0] + s[1] + s[2] - 1;
+        for (k = 0; k < STEPS; k++) {
+            measure(z, s[2], k);
+            assert_int_equal(jl_systolic_step(&array, z), JL_OK);
+            assert_int_equal(seen.last, array.tick);
+            assert_int_equal(seen.latency,
+                             3 * s[0] + 3 * s[1] + 2 * s[2] - 1);
+        }
+        assert_int_equal(seen.ticks, array.tick);
+        assert_memory_equal(seen.modes, array.count, sizeof seen.modes);
+        assert_int_equal(seen.modes[JL_SYSTOLIC_SUBTRACT], 2 * s[2] * STEPS);
+    }
+}
+
+/* Every order in which a tick visits the cells gives the same bits. */
+static void test_systolic_order_of_visits(void **state)
+{
+    static int visit[JL_SYSTOLIC_CELLS(8, 4, 4)];
+    static jl_systolic_cell kept[JL_SYSTOLIC_CELLS(8, 4, 4)];
+    jl_real x[2 * MAX], xhat[MAX], z[MAX_R];
+    struct odd odd;
+    int way, i, k;
+
+    (void)state;
+    make(&odd, 8, 4, 4, 8, 4, 0);
+    for (way = 0; way < 12; way++) {
+        start(&odd, JL_MEKF_PREV);
+        assert_int_equal(start_array(&jl_systolic_best), JL_OK);
+        for (i = 0; i < array.cells; i++)
+            visit[i] = way == 1 ? array.cells - 1 - i : i;
+        srand((unsigned)way);
+        for (i = array.cells - 1; i > 0 && way > 1; i--) {
+            int j = rand() % (i + 1), other = visit[j];
+
+            visit[j] = visit[i];
+            visit[i] = other;
+        }
+        array.visit = way == 0 ? NULL : visit;
+        for (k = 0; k < STEPS; k++) {
+            measure(z, 4, k);
+            assert_int_equal(jl_systolic_step(&array, z), JL_OK);
+        }
+        if (way == 0) {
+            memcpy(x, array.x, 12 * sizeof *x);
+            memcpy(xhat, array.xhat, 8 * sizeof *xhat);
+            memcpy(kept, array.cell, sizeof kept);
+        }
+        assert_same_bits(x, array.x, 12 * sizeof *x);
+        assert_same_bits(xhat, array.xhat, 8 * sizeof *xhat);
+        for (i = 0; i < array.cells; i++) {
+            assert_same_bits(&kept[i].r, &array.cell[i].r, sizeof kept[i].r);
+            assert_int_equal(kept[i].mode, array.cell[i].mode);
+        }
+    }
+}
+
+/* --- refusals ---------------------------------------------------------------------- */
+
+static void test_systolic_init_refuses(void **state)
+{
+    jl_systolic_schedule s = jl_systolic_best;
+    jl_systolic before;
+    struct odd odd;
+    int n_cells = 2 * JL_SYSTOLIC_CELLS(3, 2, 2);
+    int n_mem = JL_SYSTOLIC_STATE(3, 2, 2, 2, 1);
+    int *const fields[] = { &s.known, &s.y_first, &s.noise_first, &s.inside,
+                            &s.products };
+    static const int beyond[] = { 8, 2, 2, 2, 3 };
+    int i;
+
+    (void)state;
+    make(&odd, 3, 2, 2, 2, 1, 0);
+    start(&odd, JL_MEKF_PREV);
+    memset(&array, 7, sizeof array);
+    before = array;
+    assert_int_equal(jl_systolic_init(&array, &filter, &s, cells, n_cells - 1,
+                                      mem, n_mem), JL_ENOMEM);
+    assert_int_equal(jl_systolic_init(&array, &filter, &s, cells, n_cells, mem,
+                                      n_mem - 1), JL_ENOMEM);
+    filter.spread = 1;
+    assert_int_equal(start_array(&s), JL_ERANGE);
+    filter.spread = 0;
+    for (i = 0; i < 5; i++) {
+        s = jl_systolic_best;
+        *fields[i] = beyond[i];
+        assert_int_equal(start_array(&s), JL_ERANGE);
+        *fields[i] = -1;
+        assert_int_equal(start_array(&s), JL_ERANGE);
+    }
+    s = jl_systolic_best;
+    s.known = JL_SYSTOLIC_KNOW_G;
+    odd.fails = 1;
+    assert_int_equal(start_array(&s), JL_ERANGE);       /* G's code          */
+    assert_memory_equal(&array, &before, sizeof array);
+    odd.fails = 0;
+    assert_int_equal(jl_systolic_init(&array, &filter, &s, cells, n_cells, mem,
+                                      n_mem), JL_OK);
+}
+
+/* No more memory is touched than is asked for. */
+static void test_systolic_memory(void **state)
+{
+    int i, j, k;
+
+    (void)state;
+    for (i = 0; i < SIZES; i++) {
+        const int *s = sizes[i];
+        int n_cells = 2 * JL_SYSTOLIC_CELLS(s[0], s[1], s[2]);
+        int n_mem = JL_SYSTOLIC_STATE(s[0], s[1], s[2], s[3], s[4]);
+        jl_systolic_cell *c = malloc((size_t)n_cells * sizeof *c);
+        jl_real *v = malloc((size_t)(n_mem + 1) * sizeof *v), z[MAX_R];
+        struct odd odd;
+
+        assert_true(c != NULL && v != NULL);
+        make(&odd, s[0], s[1], s[2], s[3], s[4], 0);
+        start(&odd, JL_MEKF_PREV);
+        for (j = 0; j <= n_mem; j++)
+            v[j] = 12345;
+        assert_int_equal(jl_systolic_init(&array, &filter, &jl_systolic_best, c,
+                                          n_cells, v, n_mem), JL_OK);
+        for (k = 0; k < 3; k++) {
+            measure(z, s[2], k);
+            assert_int_equal(jl_systolic_step(&array, z), JL_OK);
+            jl_systolic_cov(&array, NULL, NULL);
+        }
+        assert_true(v[n_mem] == 12345);
+        assert_true(v[n_mem - 1] != 12345);
+        free(c);
+        free(v);
+    }
+}
+
+static void test_systolic_step_undone(void **state)
+{
+    static jl_systolic_cell kept_cells[JL_SYSTOLIC_CELLS(3, 2, 2)];
+    static jl_real kept[JL_SYSTOLIC_STATE(3, 2, 2, 3, 2)];
+    jl_real z[MAX_R], odd_z[MAX_R];
+    jl_systolic before;
+    struct odd odd;
+    int j, k;
+
+    (void)state;
+    for (j = 0; j < PAPER; j++) {
+        make(&odd, 3, 2, 2, 3, 2, 0);
+        start(&odd, JL_MEKF_PREV);
+        assert_int_equal(start_array(schedules[j]), JL_OK);
+        for (k = 1; k <= STEPS; k++) {
+            measure(z, 2, k);
+            if (k == 6) {
+                before = array;
+                memcpy(kept_cells, cells, sizeof kept_cells);
+                memcpy(kept, mem, (size_t)array.reals * sizeof *kept);
+                assert_int_equal(jl_systolic_step(&array, z), JL_ETIME);
+                odd.f_fails = NULL;
+                odd.fails = 1;
+                assert_int_equal(jl_systolic_step(&array, z), JL_ERANGE);
+                odd.fails = 0;
+                odd_z[0] = z[0];
+                odd_z[1] = (jl_real)NAN;
+                assert_int_equal(jl_systolic_step(&array, odd_z), JL_ENONFINITE);
+                odd_z[1] = 2 * JL_LARGE;
+                assert_int_equal(jl_systolic_step(&array, odd_z), JL_ENONFINITE);
+                assert_int_equal(jl_systolic_step(&array, NULL), JL_ERANGE);
+                assert_memory_equal(&before, &array, sizeof array);
+                assert_memory_equal(kept_cells, cells, sizeof kept_cells);
+                assert_memory_equal(kept, mem,
+                                    (size_t)array.reals * sizeof *kept);
+            }
+            assert_int_equal(jl_mekf_step(&filter, z, scratch), JL_OK);
+            if (k == 5)
+                odd.f_fails = filter.x + 3;
+            /* What fails for the next step does not fail this one. */
+            assert_int_equal(jl_systolic_step(&array, z), JL_OK);
+            if (k == 5 && j != NAIVE)
+                assert_true(odd.f_calls > 0);
+            assert_same_filter();
+        }
+    }
+}
+
+/* r > n + m exact measurements: V is singular. */
+static void test_systolic_singular(void **state)
+{
+    jl_real z[MAX_R], *UR;
+    struct odd odd;
+    int j, i;
+
+    (void)state;
+    for (j = 0; j < PAPER; j++) {
+        make(&odd, 1, 1, 4, 1, 1, 0);
+        start(&odd, JL_MEKF_PREV);
+        UR = filter.UR;
+        for (i = 0; i < 16; i++)
+            UR[i] = 0;
+        assert_int_equal(start_array(schedules[j]), JL_OK);
+        measure(z, 4, 1);
+        assert_int_equal(jl_mekf_step(&filter, z, scratch), JL_ESINGULAR);
+        assert_int_equal(jl_systolic_step(&array, z), JL_ESINGULAR);
+        assert_same_filter();
     }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_systolic_prints),
-        cmocka_unit_test(test_systolic_gives_filters_estimates)
+        cmocka_unit_test(test_systolic_gives_filters_estimates),
+        cmocka_unit_test(test_systolic_counts_of_table),
+        cmocka_unit_test(test_systolic_counts_of_formulas),
+        cmocka_unit_test(test_systolic_trace_sees_all),
+        cmocka_unit_test(test_systolic_order_of_visits),
+        cmocka_unit_test(test_systolic_init_refuses),
+        cmocka_unit_test(test_systolic_memory),
+        cmocka_unit_test(test_systolic_step_undone),
+        cmocka_unit_test(test_systolic_singular)
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
