@@ -145,12 +145,32 @@ static void test_ekf_meets_reference(void **state)
     }
 }
 
+static void test_zoo_refuses(void **state)
+{
+    struct mekf_zoo zoo;
+    jl_mekf_model model, before;
+
+    (void)state;
+    memset(&zoo, 0, sizeof zoo);
+    memset(&model, 1, sizeof model);
+    before = model;
+    assert_int_equal(mekf_zoo_model(&model, "ar2", &zoo), -1);
+    assert_int_equal(mekf_zoo_model(&model, "spring2", &zoo), -1);
+    zoo.r = ZOO_R + 1;
+    assert_int_equal(mekf_zoo_model(&model, "spring2", &zoo), -1);
+    assert_same_bits(&model, &before, sizeof model);
+    zoo.r = ZOO_R;
+    assert_int_equal(mekf_zoo_model(&model, "spring2", &zoo), 0);
+    assert_int_equal(model.r, ZOO_R);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_mekf_meets_reference),
         cmocka_unit_test(test_mekf_by_differences),
         cmocka_unit_test(test_ekf_meets_reference),
+        cmocka_unit_test(test_zoo_refuses),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

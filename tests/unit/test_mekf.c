@@ -33,12 +33,16 @@ static jl_real scatter(int i, int j, int k)
     return (jl_real)(h >> 9) / 4194304 - 1;
 }
 
-/* Counts a call of n numbers to be written, all 0 before; afterwards spoils
- * what was written, or gives the code to return. */
-static void begin(struct odd *odd, const jl_real *out, int n)
+/* Counts a call of n numbers to be written, all 0 before, at x, y that must be
+ * within bounds; afterwards spoils what was written, or gives the code to
+ * return. */
+static void begin(struct odd *odd, const jl_real *out, int n,
+                  const jl_real *x, const jl_real *y)
 {
     int i;
 
+    assert_true(x == NULL || jl_vec_within(x, odd->model.n, JL_LARGE));
+    assert_true(jl_vec_within(y, odd->model.m, JL_LARGE));
     for (i = 0; i < n; i++)
         assert_true(out[i] == 0);
     odd->calls++;
@@ -60,7 +64,7 @@ static int odd_f(jl_real *f, const jl_real *y, void *context)
     struct odd *odd = context;
     int n = odd->model.n, m = odd->model.m, i, j;
 
-    begin(odd, f, n * n);
+    begin(odd, f, n * n, NULL, y);
     for (i = 0; i < n; i++)
         for (j = 0; j < n; j++)
             f[i * n + j] = odd->gain * ((i == j ? JL_C(0.6) : 0)
@@ -75,8 +79,7 @@ static int odd_df(jl_real *J, const jl_real *x, const jl_real *y,
     struct odd *odd = context;
     int n = odd->model.n, m = odd->model.m, i, j;
 
-    (void)y;
-    begin(odd, J, n * m);
+    begin(odd, J, n * m, x, y);
     for (i = 0; i < n; i++)
         for (j = 0; j < n; j++)
             J[i * m + (i + j) % m] += odd->gain * JL_C(0.05)
@@ -90,7 +93,7 @@ static int odd_h(jl_real *y_next, const jl_real *x, const jl_real *y,
     struct odd *odd = context;
     int n = odd->model.n, m = odd->model.m, i;
 
-    begin(odd, y_next, m);
+    begin(odd, y_next, m, x, y);
     for (i = 0; i < m; i++)
         y_next[i] = JL_C(0.9) * y[i] + JL_C(0.1) * x[i % n];
     return end(odd, y_next, m);
@@ -102,8 +105,7 @@ static int odd_dh(jl_real *J, const jl_real *x, const jl_real *y,
     struct odd *odd = context;
     int n = odd->model.n, m = odd->model.m, i;
 
-    (void)x, (void)y;
-    begin(odd, J, m * (n + m));
+    begin(odd, J, m * (n + m), x, y);
     for (i = 0; i < m; i++) {
         J[i * (n + m) + i % n] = JL_C(0.1);
         J[i * (n + m) + n + i] = JL_C(0.9);
@@ -117,8 +119,7 @@ static int odd_c(jl_real *c, const jl_real *x, const jl_real *y,
     struct odd *odd = context;
     int n = odd->model.n, r = odd->model.r, i, j;
 
-    (void)x;
-    begin(odd, c, r * n);
+    begin(odd, c, r * n, x, y);
     odd->c_calls++;
     for (i = 0; i < r; i++)
         for (j = 0; j < n; j++)
@@ -132,7 +133,7 @@ static int odd_dc(jl_real *J, const jl_real *x, const jl_real *y,
     struct odd *odd = context;
     int n = odd->model.n, N = n + odd->model.m, r = odd->model.r, i, j;
 
-    begin(odd, J, r * N);
+    begin(odd, J, r * N, x, y);
     for (i = 0; i < r; i++) {
         for (j = 0; j < n; j++)
             J[i * N + j] = scatter(i, j, 2) + (j == 0 ? y[0] / 4 : 0);
@@ -148,8 +149,7 @@ static int odd_G(jl_real *G1, jl_real *G2, jl_real *G3, const jl_real *x,
     const jl_mekf_model *m = &odd->model;
     int i;
 
-    (void)x, (void)y;
-    begin(odd, G1, m->n * m->p1);
+    begin(odd, G1, m->n * m->p1, x, y);
     for (i = 0; i < m->n * m->p1; i++)
         G1[i] = scatter(i, 0, 3);
     for (i = 0; i < m->m * m->p1; i++)
@@ -714,7 +714,39 @@ static void test_mekf_refuses_to_overflow(void **state)
     }
 }
 
-/* --- a singular V ---------------------------------------------------------------- */
+/* Every element of the array is below JL_LARGE, a deviation above. */
+static void test_mekf_refuses_large_deviations(void **state)
+{
+    jl_real x[] = { 0, 0, 0 }, P[9] = { 0 }, f[4] = { 0 }, most = 0;
+    struct rig rig;
+    struct kept kept;
+    int i;
+
+    (void)state;
+    rig_init(&rig, 2, 1, 1, 1, 1, 1);
+    assert_int_equal(odd_f(f, x, &rig.odd), JL_OK);
+    for (i = 0; i < 4; i++)
+        if (f[i] > most)
+            most = f[i];
+    rig.odd.gain = JL_C(0.99999) / most;
+    P[0] = P[4] = JL_LARGE * JL_LARGE;
+    P[8] = 1;
+    assert_int_equal(jl_mekf_set(&rig.f, x, P, NULL, scratch_of(&rig)),
+                     JL_OK);
+    assert_int_equal(jl_ekf_set(&rig.ekf, x, P, ekf_scratch_of(&rig)),
+                     JL_OK);
+    keep(&kept, &rig);
+    assert_int_equal(step(&rig, NULL), JL_ENONFINITE);
+    assert_int_equal(ekf_step(&rig, NULL), JL_ENONFINITE);
+    check_kept(&kept, &rig);
+    let_go(&kept);
+    rig.odd.gain = JL_C(0.99) / most;
+    assert_int_equal(step(&rig, NULL), JL_OK);
+    assert_int_equal(ekf_step(&rig, NULL), JL_OK);
+    rig_close(&rig);
+}
+
+/* --- a singular V ------------------------------------------------------------- */
 
 struct rows {
     int r;
@@ -828,6 +860,7 @@ int main(void)
         cmocka_unit_test(test_mekf_refuses_numbers),
         cmocka_unit_test(test_mekf_functions_fail),
         cmocka_unit_test(test_mekf_refuses_to_overflow),
+        cmocka_unit_test(test_mekf_refuses_large_deviations),
         cmocka_unit_test(test_mekf_singular),
     };
 
