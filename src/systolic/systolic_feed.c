@@ -23,8 +23,8 @@
  *     m - 1, F waits for ybar ([y; x]);  n + m, F;  r, H F
  *     n + m + 2 r from the first of H F to the first row U F' (or until the
  *         n + m rows U_Q G' are in, whichever is more);  n + m, U F'
- * or, where H is what all waits for, 2 n - 1 from f to H F (n rows f, and n - 1
- * ticks from there to the last sum of f xhat). */
+ * or, where H is what all waits for, 2 n - 1 from f to H F: n - 1 to the last row
+ * of f, whose sum takes n through the diamonds. */
 #include "systolic/systolic_parts.h"
 
 /* feed of a cell: 1 .. rows for a row of the QR, rows + 1 for the Faddeev row,
