@@ -85,8 +85,9 @@ static void launch_product(jl_systolic *array, jl_systolic_triangle *t,
     if (launch <= t->busy)
         return;
     /* What B predicts is A's, too: has A taken what was predicted before? */
-    if (t->delay && (array->left.step < t->step
-                     || launch + n + 2 * r < array->left.busy + array->left.N))
+    if (t->delay && array->sums_of < t->step
+        && (array->left.step < t->step
+            || launch + n + 2 * r < array->left.busy + array->left.N))
         return;
     block = choose_block(array, t);
     if (block < 0)
@@ -139,11 +140,10 @@ static int can_rotate(const jl_systolic *array, const jl_systolic_triangle *t,
 {
     if (!products_precede(array, t, depth))
         return 0;
-    /* What the last QR left must last until the step's end (cov). */
-    if (t->delay && t->step > array->step + 1)
-        return 0;
     if (noise_row(array, t, t->rows) >= 0)
         return t->noise_known >= t->step;
+    /* Not earlier than the last products enter, which is after the last step's
+     * end: cov relies on it. */
     return remaining(array, t) == 0 && array->tick >= t->due
         + (t->rows - (array->schedule.noise_first ? t->noises : 0));
 }

@@ -8,7 +8,7 @@
 #include "jumplink/systolic.h"
 
 #define MAX 8                           /* n and m, each                    */
-#define MAX_R 5
+#define MAX_R 9
 #define STEPS 12
 
 #if JL_REAL_FLOAT
@@ -282,7 +282,7 @@ static void assert_same_filter(void)
 }
 
 static void compare(struct odd *odd, const jl_systolic_schedule *schedule,
-                    jl_mekf_c c)
+                    jl_mekf_c c, int steps)
 {
     jl_real z[MAX_R];
     int k;
@@ -290,7 +290,7 @@ static void compare(struct odd *odd, const jl_systolic_schedule *schedule,
     start(odd, c);
     assert_int_equal(start_array(schedule), JL_OK);
     assert_same_filter();
-    for (k = 1; k <= STEPS; k++) {
+    for (k = 1; k <= steps; k++) {
         measure(z, odd->model.r, k);
         assert_int_equal(jl_mekf_step(&filter, z, scratch), JL_OK);
         assert_int_equal(jl_systolic_step(&array, z), JL_OK);
@@ -309,7 +309,7 @@ static const int sizes[][5] = {         /* n m r p1 p2 */
     { 1, 1, 1, 1, 1 }, { 3, 2, 2, 3, 2 }, { 4, 2, 2, 4, 2 }, { 2, 4, 1, 2, 4 },
     { 4, 4, 4, 4, 4 }, { 8, 4, 4, 8, 4 }, { 4, 1, 3, 2, 1 }, { 1, 3, 2, 1, 0 },
     { 2, 1, 5, 1, 1 }, { 1, 1, 4, 3, 3 }, { 8, 1, 1, 1, 1 }, { 1, 8, 1, 2, 8 },
-    { 2, 2, 3, 6, 1 }, { 5, 1, 5, 8, 8 }
+    { 2, 2, 3, 6, 1 }, { 5, 1, 5, 8, 8 }, { 1, 2, 7, 4, 4 }
 };
 #define SIZES ((int)(sizeof sizes / sizeof *sizes))
 
@@ -331,9 +331,41 @@ static void test_systolic_gives_filters_estimates(void **state)
                 for (c = JL_MEKF_PREV; c <= JL_MEKF_FILT; c++) {
                     make(&odd, s[0], s[1], s[2], s[3], s[4], known);
                     schedule.known = known;
-                    compare(&odd, &schedule, (jl_mekf_c)c);
+                    compare(&odd, &schedule, (jl_mekf_c)c, STEPS);
                 }
             }
+}
+
+static uint32_t seed;
+
+static int below(int n)
+{
+    seed = seed * 1664525u + 1013904223u;
+    return (int)((seed >> 8) % (uint32_t)n);
+}
+
+/* Whatever the sizes and the order: nothing is fed before it is there, and nothing
+ * that is still to be fed is overwritten. */
+static void test_systolic_any_schedule(void **state)
+{
+    int i;
+
+    (void)state;
+    seed = 1;
+    for (i = 0; i < 3000; i++) {
+        jl_systolic_schedule s;
+        struct odd odd;
+        int n = 1 + below(5), m = 1 + below(5), r = 1 + below(MAX_R);
+        int p1 = 1 + below(6), p2 = below(6);
+
+        make(&odd, n, m, r, p1, p2, below(8));
+        s.known = below(3) > 0 ? odd.constant : odd.constant & below(8);
+        s.y_first = below(2);
+        s.noise_first = below(2);
+        s.inside = below(2);
+        s.products = below(3);
+        compare(&odd, &s, (jl_mekf_c)below(3), 4);
+    }
 }
 
 /* --- counts --------------------------------------------------------------------- */
@@ -708,6 +740,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_systolic_gives_filters_estimates),
+        cmocka_unit_test(test_systolic_any_schedule),
         cmocka_unit_test(test_systolic_counts_of_table),
         cmocka_unit_test(test_systolic_counts_of_formulas),
         cmocka_unit_test(test_systolic_trace_sees_all),
