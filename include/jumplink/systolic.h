@@ -22,8 +22,8 @@
  * A step feeds the rows of mekf.h's matrices, U_R being in place already, in
  * mode QR; [(c xp - z)' | xp'] in mode Faddeev through the first r rows, below
  * which the estimate comes out; and for the next step the rows of H F and F in
- * mode multiply, through the rows that hold U, whose products U F', U F'H' come
- * out in the east and are fed back from the north; diamonds do the same to xhat.
+ * mode multiply, through the rows that hold U: products U F', U F'H' come out
+ * in the east and are fed back from the north; diamonds do the same to xhat.
  * f, F, G, H, c, h, and H F and U_Q G' of them, are evaluated outside, by the
  * host, in no time, but not before their arguments have left the array.
  */
@@ -36,7 +36,7 @@
 extern "C" {
 #endif
 
-/* --- cells ----------------------------------------------------------------- */
+/* --- cells ---------------------------------------------------------------- */
 
 typedef enum jl_systolic_mode {
     JL_SYSTOLIC_IDLE,
@@ -79,10 +79,10 @@ typedef struct jl_systolic_cell {
     ((n) + 1 + (((n) + (m) + (r)) * ((n) + (m) + (r) + 1) \
                 + ((n) + (r)) * ((n) + (r) + 1)) / 2)
 
-/* --- schedules --------------------------------------------------------------- */
+/* --- schedules ------------------------------------------------------------ */
 
-/* A row is fed as soon as what it needs is known, its port is free, and the rows
- * before it have been fed; this is the order. */
+/* A row is fed as soon as what it needs is known, its port is free, and the
+ * rows before it have been fed; this is the order. */
 typedef struct jl_systolic_schedule {
     int known;                  /* what the host knows a step ahead, since it
                                    never changes: the sum of JL_SYSTOLIC_KNOW_*.
@@ -104,18 +104,18 @@ enum {
 };
 enum { JL_SYSTOLIC_F_FIRST, JL_SYSTOLIC_BLOCKS, JL_SYSTOLIC_ROWS };
 
-/* Ticks of a step in the steady state, counted with p1 = n, p2 = m, n to 8, m and
- * r to 5, by the tests:
+/* Ticks of a step in the steady state, counted with p1 = n, p2 = m, n to 8, m
+ * and r to 5, by the tests:
  *     paper  all is known ahead, so right for linear models only
  *                3n + 3m + 2r + 1, where r <= n + m
  *     naive  [x; y], rows U F' first, products through row 0
  *                6n + 4m + 4r - 2
  *     best   [y; x], rows U_Q G' first, products at row r, in blocks
- *                max(max(1, m-1) + 3n + 3m + 2r, 4n + 3m + 2r - 2), where r < n + m
- *                (n = m = r = 1: 8)
+ *                max(max(1, m-1) + 3n + 3m + 2r, 4n + 3m + 2r - 2),
+ *                where r < n + m (n = m = r = 1: 8)
  *            with JL_SYSTOLIC_KNOW_C and _G added
  *                max(1, m-1) + 3n + 3m + r, where r <= n, r <= m, n <= 2m
- *     mixed  best, but with JL_SYSTOLIC_ROWS: a tick less where m > n/2 or so
+ *     mixed  best, but with JL_SYSTOLIC_ROWS: 1 to 4 ticks less where n <= m
  * Elsewhere B is the slower one, or waits for G, and steps may take turns. */
 extern const jl_systolic_schedule jl_systolic_paper;
 extern const jl_systolic_schedule jl_systolic_naive;
@@ -126,7 +126,7 @@ extern const jl_systolic_schedule jl_systolic_mixed;
  * the first row of products follows the Faddeev row, a tick later. */
 #define JL_SYSTOLIC_PAPER_TICKS(n, m, r) (3 * (n) + 3 * (m) + 2 * (r))
 
-/* --- the machine ------------------------------------------------------------- */
+/* --- the machine ---------------------------------------------------------- */
 
 typedef struct jl_systolic jl_systolic;
 
@@ -223,7 +223,8 @@ int jl_systolic_step(jl_systolic *array, const jl_real *z);
  * a copy of the array (in memory of its own) ticks on. */
 void jl_systolic_cov(jl_systolic *array, jl_real *P, jl_real *P1);
 
-/* Cell-ticks of work among count, as the paper has it: QR, Faddeev, multiply. */
+/* Cell-ticks of work in count, as the paper has it: QR, Faddeev, multiply.
+ * Utilisation is work / (cells x ticks). */
 #define JL_SYSTOLIC_WORK(count) \
     ((count)[JL_SYSTOLIC_QR] + (count)[JL_SYSTOLIC_FADDEEV] \
      + (count)[JL_SYSTOLIC_MULTIPLY])

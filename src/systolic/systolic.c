@@ -6,7 +6,7 @@
 
 #include "mat/mat_k.h"
 
-/* --- memory ------------------------------------------------------------------ */
+/* --- memory --------------------------------------------------------------- */
 
 static jl_real *some(jl_real **mem, int reals)
 {
@@ -50,7 +50,7 @@ static void bind(jl_systolic *array, jl_systolic_cell *cell, jl_real *mem)
     bind_triangle(&array->right, &mem, r);
 }
 
-/* --- the cells ----------------------------------------------------------------- */
+/* --- the cells ------------------------------------------------------------ */
 
 /* Cells of a triangle, U [N-r,N-r] in the lower rows. */
 static void lay_triangle(jl_systolic *array, jl_systolic_triangle *t,
@@ -158,7 +158,7 @@ int jl_systolic_init(jl_systolic *array, const jl_mekf *filter,
     return status;
 }
 
-/* --- a step -------------------------------------------------------------------- */
+/* --- a step --------------------------------------------------------------- */
 
 static void copy_memory(const jl_systolic *array, int to, int from)
 {
@@ -206,7 +206,7 @@ int jl_systolic_step(jl_systolic *array, const jl_real *z)
     return status;
 }
 
-/* --- the covariances ------------------------------------------------------------ */
+/* --- the covariances ------------------------------------------------------ */
 
 /* P = U'U of what the last QR left. */
 static void square(jl_real *P, const jl_systolic *array,

@@ -1,14 +1,14 @@
 /* What a cell does in a tick.
  *
- * Each cell writes its own wires and registers, and of others it reads only what
- * was written a tick ago: the order in which they are visited cannot matter. */
+ * Each cell writes its own wires and registers, and of others it reads only
+ * what was written a tick ago: the order of visits cannot matter. */
 #include "systolic/systolic_parts.h"
 
 #include <string.h>
 
 #include "base/mathx.h"
 
-/* --- Table 1 of the paper --------------------------------------------------- */
+/* --- Table 1 of the paper ------------------------------------------------- */
 
 /* Two tiny numbers times this, a power of two, have squares that are normal. */
 #define MAGNIFY (JL_EPSILON / JL_REAL_MIN)
@@ -66,7 +66,7 @@ static void inner(jl_systolic_cell *cell, const jl_systolic_packet *in,
     }
 }
 
-/* --- and the others --------------------------------------------------------- */
+/* --- and the others ------------------------------------------------------- */
 
 /* xhat stays here; what goes to the rows below is only handed on. */
 static void diamond(jl_systolic_cell *cell, const jl_systolic_packet *in,
@@ -88,7 +88,7 @@ static void diamond(jl_systolic_cell *cell, const jl_systolic_packet *in,
     }
 }
 
-/* --- a tick ----------------------------------------------------------------- */
+/* --- a tick --------------------------------------------------------------- */
 
 static void visit(jl_systolic *array, jl_systolic_cell *cell)
 {

@@ -4,27 +4,28 @@
  * t + j, since what it meets there comes from the west one column a tick, and
  * cell (i,j) works on it in tick t + i + j (a tick later below the diamonds).
  * Products that enter column r at row i in a tick count as launched r + i ticks
- * before it: so two rows cannot meet if no two have the same launch, and what
+ * before it.  So two rows cannot meet if no two have the same launch, and what
  * follows is all there is to know.
  *
  *   - Estimates leave row r - 1: that of column j in tick t + r + j.  From them
  *     come F, and so the products' launch.
- *   - U F' leaves row i of N in the east: t + i + N (+ 1 if there are diamonds),
- *     column k of it k ticks after the first, just as row i wants it back at the
- *     north.  So that row can be launched when its first element is out, or
- *     when the last one will be in time, t >= launch of k - k + i + N.
+ *   - U F' leaves row i of N in the east in tick t + i + N (one later if there
+ *     are diamonds), its column k that much after launch of row k of F: one
+ *     after the other, just as they are wanted back at the north.  So row i can
+ *     be launched when every column k will be in time, t + k >= launch of
+ *     k + i + N.
  *   - Sums leave the diamonds in tick t + n + 2 r, differences one later.
- *   - The QR must not overtake the products, which need U; the estimate, not the
- *     QR; and products of the next step, not the estimate: they are launched in
- *     this order.  But the first row of the QR enters at row 0, and products
- *     enter at row r: it may enter before them if they have the earlier launch.
+ *   - The QR must not overtake the products, which need U; nor the Faddeev row
+ *     the QR; nor products of the next step the Faddeev row: this is the order
+ *     of launches.  But the QR enters at row 0, products at row r: its first
+ *     row may enter before the last of them if it has the later launch.
  *
- * So a step takes, from the row for Faddeev of A to the next, with Q first:
- *     m - 1, F waits for ybar ([y; x]);  n + m, F;  r, H F
+ * So a step takes, from the Faddeev row of A to the next, with Q first:
+ *     m - 1 (at least 1), F waits for ybar ([y; x]);  n + m, F;  r, H F
  *     n + m + 2 r from the first of H F to the first row U F' (or until the
  *         n + m rows U_Q G' are in, whichever is more);  n + m, U F'
- * or, where H is what all waits for, 2 n - 1 from f to H F: n - 1 to the last row
- * of f, whose sum takes n through the diamonds. */
+ * or, where H is what all waits for, 2 n - 1 from f to H F: n - 1 to the last
+ * row of f, whose sum takes n through the diamonds. */
 #include "systolic/systolic_parts.h"
 
 /* feed of a cell: 1 .. rows for a row of the QR, rows + 1 for the Faddeev row,
@@ -34,7 +35,7 @@ static int qr_rows(const jl_systolic *array, const jl_systolic_triangle *t)
     return t->noises + t->N - array->r;
 }
 
-/* --- products --------------------------------------------------------------- */
+/* --- products ------------------------------------------------------------- */
 
 /* Rows of a block that are not fed yet. */
 static int to_come(const jl_systolic *array, const jl_systolic_triangle *t,
@@ -51,13 +52,12 @@ static int remaining(const jl_systolic *array, const jl_systolic_triangle *t)
 /* The block of which a row can be fed now; -1: none. */
 static int choose_block(const jl_systolic *array, const jl_systolic_triangle *t)
 {
-    static const int orders[3][3] = {
-        { JLI_SENSE, JLI_MOVE, JLI_PREDICT }, { JLI_MOVE, JLI_SENSE, JLI_PREDICT },
+    static const int orders[2][3] = {
+        { JLI_SENSE, JLI_MOVE, JLI_PREDICT },
         { JLI_MOVE, JLI_SENSE, JLI_PREDICT }
     };
     int rule = array->schedule.products, i;
-    const int *order = orders[t->delay ? 2
-                              : rule == JL_SYSTOLIC_F_FIRST ? 1 : 0];
+    const int *order = orders[t->delay || rule == JL_SYSTOLIC_F_FIRST];
 
     if (t->block >= 0 && (t->delay || rule != JL_SYSTOLIC_ROWS)
         && to_come(array, t, t->block) > 0)
@@ -105,7 +105,7 @@ static void launch_product(jl_systolic *array, jl_systolic_triangle *t,
     array->cell[port].feed = qr_rows(array, t) + 2 + tag;
 }
 
-/* --- rows of the QR, and the one for Faddeev ------------------------------- */
+/* --- rows of the QR, and the one for Faddeev ------------------------------ */
 
 static int noise_row(const jl_systolic *array, const jl_systolic_triangle *t,
                      int row)
@@ -148,7 +148,7 @@ static int can_rotate(const jl_systolic *array, const jl_systolic_triangle *t,
         + (t->rows - (array->schedule.noise_first ? t->noises : 0));
 }
 
-/* Will the k-th difference, and the k-th prediction, be there in tick + k and in
+/* Will the k-th difference be there in tick + k, and the k-th prediction in
  * tick + r + k? */
 static int can_correct(const jl_systolic *array, const jl_systolic_triangle *t)
 {
@@ -165,8 +165,7 @@ static int can_correct(const jl_systolic *array, const jl_systolic_triangle *t)
             || array->sums > array->differences + 1
             || array->tick < B->launch[b] + n + 2 * r + 1))
         return 0;
-    return (B->sent[JLI_MOVE] == n || is_over)
-        && array->tick + r + later >= B->launch[JLI_MOVE] + n + 2 * r;
+    return array->tick + r + later >= B->launch[JLI_MOVE] + n + 2 * r;
 }
 
 static void launch_row(jl_systolic *array, jl_systolic_triangle *t, int depth)
@@ -187,7 +186,7 @@ static void launch_row(jl_systolic *array, jl_systolic_triangle *t, int depth)
     }
 }
 
-/* --- elements --------------------------------------------------------------- */
+/* --- elements ------------------------------------------------------------- */
 
 static void put_element(jl_systolic *array, const jl_systolic_triangle *t,
                         jl_systolic_cell *cell)
@@ -221,8 +220,7 @@ static void put_element(jl_systolic *array, const jl_systolic_triangle *t,
     }
 }
 
-/* A row goes on to the next column.  first: a cell of column `column`, and those
- * east of it. */
+/* A row goes on to the next column, of those from cell `first` on. */
 static void shift(jl_systolic *array, int first, int columns)
 {
     int j;

@@ -9,7 +9,7 @@
 #include "mat/mat_k.h"
 #include "mekf/mekf_parts.h"
 
-/* --- what leaves the array --------------------------------------------------- */
+/* --- what leaves the array ------------------------------------------------ */
 
 static const jl_systolic_packet *south_of(const jl_systolic *array, int cell)
 {
@@ -21,8 +21,8 @@ static const jl_systolic_packet *east_of(const jl_systolic *array, int cell)
     return &array->cell[cell].east[array->phase];
 }
 
-/* Is V singular?  As jl_mekf_step asks: by what rounding leaves of its diagonal.
- * By the time estimates come out of row r - 1, V is complete. */
+/* Is V singular?  As jl_mekf_step asks: by what rounding leaves of its
+ * diagonal.  By the time estimates come out of row r - 1, V is complete. */
 static int judge(const jl_systolic *array, const jl_systolic_triangle *t)
 {
     int r = array->r, i, j;
@@ -120,7 +120,7 @@ void jli_systolic_collect(jl_systolic *array)
     }
 }
 
-/* --- the model's functions ---------------------------------------------------- */
+/* --- the model's functions ------------------------------------------------ */
 
 static void linear(struct jli_linear *l, const jl_systolic *array)
 {
@@ -168,7 +168,7 @@ static int make_G(jl_systolic *array)
                           array->work);
 }
 
-/* --- rows for the array ------------------------------------------------------- */
+/* --- rows for the array --------------------------------------------------- */
 
 /* Rows tag.. of t->map = A [rows,inner] B [inner,N-r] in the array's order. */
 static void multiply_rows(jl_systolic *array, jl_systolic_triangle *t, int tag,
@@ -224,7 +224,7 @@ static void noise_rows(jl_systolic *array, jl_systolic_triangle *t,
     t->noise_known = t->step;
 }
 
-/* --- in which order ------------------------------------------------------------ */
+/* --- in which order ------------------------------------------------------- */
 
 /* A function of the next step's that fails does not fail this one: it is asked
  * again. */
@@ -238,7 +238,8 @@ static int evaluate_left(jl_systolic *array)
     jl_systolic_triangle *t = &array->left;
     int s = t->step, status;
 
-    if (array->has_yp < s && array->has_y >= s - 1 && array->has_xhat >= s - 1) {
+    if (array->has_yp < s && array->has_y >= s - 1
+        && array->has_xhat >= s - 1) {
         status = make_F(array);
         if (status != JL_OK)
             return later(array, s, status);
@@ -255,7 +256,8 @@ static int evaluate_left(jl_systolic *array)
             return later(array, s, status);
         array->has_c = s;
     }
-    if (t->known[JLI_SENSE] < s && t->known[JLI_MOVE] == s && array->has_c >= s) {
+    if (t->known[JLI_SENSE] < s && t->known[JLI_MOVE] == s
+        && array->has_c >= s) {
         multiply_rows(array, t, 0, array->H, array->F, array->r);
         t->known[JLI_SENSE] = s;
     }
@@ -309,11 +311,12 @@ static int evaluate_right(jl_systolic *array)
         if (status != JL_OK)
             return status;
     }
-    if (t->known[JLI_MOVE] == s && t->known[JLI_SENSE] < s && array->has_cc >= s) {
+    if (t->known[JLI_SENSE] < s && t->known[JLI_MOVE] == s
+        && array->has_cc >= s) {
         multiply_rows(array, t, 0, array->c_B, array->f, array->r);
         t->known[JLI_SENSE] = s;
     }
-    if (t->known[JLI_MOVE] == s && t->known[JLI_PREDICT] < s
+    if (t->known[JLI_PREDICT] < s && t->known[JLI_MOVE] == s
         && array->has_c >= s) {
         multiply_rows(array, t, t->N, array->c_A, array->f, array->r);
         t->known[JLI_PREDICT] = s;

@@ -17,7 +17,7 @@
 #define SAME 1e-13
 #endif
 
-/* --- a model of any size ---------------------------------------------------- */
+/* --- a model of any size -------------------------------------------------- */
 
 struct odd {
     jl_mekf_model model;
@@ -186,7 +186,7 @@ static void make(struct odd *odd, int n, int m, int r, int p1, int p2,
     odd->model.context = odd;
 }
 
-/* --- a filter and an array ---------------------------------------------------- */
+/* --- a filter and an array ------------------------------------------------ */
 
 static jl_mekf filter;
 static jl_real filter_mem[JL_MEKF_STATE(MAX, MAX, MAX_R, MAX, MAX)];
@@ -265,7 +265,7 @@ static void assert_near(const jl_real *a, const jl_real *b, int n, double least)
         assert_close(a[i], b[i], SAME * unit);
 }
 
-/* --- estimates ------------------------------------------------------------------ */
+/* --- estimates ------------------------------------------------------------ */
 
 static void assert_same_filter(void)
 {
@@ -344,8 +344,8 @@ static int below(int n)
     return (int)((seed >> 8) % (uint32_t)n);
 }
 
-/* Whatever the sizes and the order: nothing is fed before it is there, and nothing
- * that is still to be fed is overwritten. */
+/* Whatever the sizes and the order: nothing is fed before it is there, and
+ * nothing that is still to be fed is overwritten. */
 static void test_systolic_any_schedule(void **state)
 {
     int i;
@@ -368,7 +368,7 @@ static void test_systolic_any_schedule(void **state)
     }
 }
 
-/* --- counts --------------------------------------------------------------------- */
+/* --- counts --------------------------------------------------------------- */
 
 /* Ticks of a step, and cell-ticks of work in it, in the steady state. */
 static long ticks_of(struct odd *odd, const jl_systolic_schedule *schedule,
@@ -428,8 +428,10 @@ static void test_systolic_counts_of_table(void **state)
         int n, m, r, cells, paper, percent, best, constant, mixed;
     } rows[] = {
         { 1, 1, 1, 11, 8, 57, 8, 8, 8 }, { 3, 2, 2, 47, 19, 63, 20, 18, 20 },
-        { 4, 2, 2, 62, 22, 66, 24, 21, 24 }, { 2, 4, 1, 37, 20, 73, 23, 22, 22 },
-        { 4, 4, 4, 119, 32, 58, 35, 31, 34 }, { 8, 4, 4, 223, 44, 67, 50, 43, 50 }
+        { 4, 2, 2, 62, 22, 66, 24, 21, 24 },
+        { 2, 4, 1, 37, 20, 73, 23, 22, 22 },
+        { 4, 4, 4, 119, 32, 58, 35, 31, 34 },
+        { 8, 4, 4, 223, 44, 67, 50, 43, 50 }
     };
     int i;
 
@@ -477,7 +479,8 @@ static void test_systolic_counts_of_formulas(void **state)
                     assert_int_equal(count(n, m, r, &jl_systolic_paper, ALL,
                                            &work), 3 * n + 3 * m + 2 * r + 1);
                 if (r < n + m && n + m + r > 3)
-                    assert_int_equal(count(n, m, r, &jl_systolic_best, 0, &work),
+                    assert_int_equal(count(n, m, r, &jl_systolic_best, 0,
+                                           &work),
                                      larger(base + r,
                                             4 * n + 3 * m + 2 * r - 2));
                 if (r <= n && r <= m && n <= 2 * m)
@@ -486,10 +489,10 @@ static void test_systolic_counts_of_formulas(void **state)
             }
 }
 
-/* --- cells ------------------------------------------------------------------------ */
+/* --- cells ---------------------------------------------------------------- */
 
-/* What happened, tick by tick: cells of a mode, the left array's first feed since
- * the last estimate, that estimate. */
+/* What happened, tick by tick: cells of a mode, the left array's first feed
+ * since the last estimate, that estimate. */
 struct seen {
     long ticks, modes[JL_SYSTOLIC_MODES], first, last, latency;
     int last_column;
@@ -508,7 +511,8 @@ static void see(const jl_systolic *a, void *context)
         seen->modes[c->mode]++;
         if (c->part != JL_SYSTOLIC_LEFT)
             continue;
-        if (c->column == 0 && c->mode == JL_SYSTOLIC_QR && seen->first <= seen->last)
+        if (c->column == 0 && c->mode == JL_SYSTOLIC_QR
+            && seen->first <= seen->last)
             seen->first = a->tick;
         if (c->row == a->r - 1 && c->column == seen->last_column
             && c->mode == JL_SYSTOLIC_FADDEEV) {
@@ -590,7 +594,7 @@ static void test_systolic_order_of_visits(void **state)
     }
 }
 
-/* --- refusals ---------------------------------------------------------------------- */
+/* --- refusals ------------------------------------------------------------- */
 
 static void test_systolic_init_refuses(void **state)
 {
@@ -693,9 +697,11 @@ static void test_systolic_step_undone(void **state)
                 odd.fails = 0;
                 odd_z[0] = z[0];
                 odd_z[1] = (jl_real)NAN;
-                assert_int_equal(jl_systolic_step(&array, odd_z), JL_ENONFINITE);
+                assert_int_equal(jl_systolic_step(&array, odd_z),
+                                 JL_ENONFINITE);
                 odd_z[1] = 2 * JL_LARGE;
-                assert_int_equal(jl_systolic_step(&array, odd_z), JL_ENONFINITE);
+                assert_int_equal(jl_systolic_step(&array, odd_z),
+                                 JL_ENONFINITE);
                 assert_int_equal(jl_systolic_step(&array, NULL), JL_ERANGE);
                 assert_memory_equal(&before, &array, sizeof array);
                 assert_memory_equal(kept_cells, cells, sizeof kept_cells);
