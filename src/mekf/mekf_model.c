@@ -105,9 +105,8 @@ static int move_y(jl_real *yp, jl_real *J, const jl_mekf_model *model,
     return jli_checked(status, J, m * (n + m));
 }
 
-/* xp, F at x, y; scratch [max(n N + 2 n + m, 2 N + 2 m)] */
-static int move(struct jli_linear *l, const jl_mekf_model *model,
-                const jl_real *x, const jl_real *y, jl_real *scratch)
+int jli_mekf_move(struct jli_linear *l, const jl_mekf_model *model,
+                  const jl_real *x, const jl_real *y, jl_real *scratch)
 {
     int n = model->n, m = model->m, status;
     jl_real *at = scratch;
@@ -123,9 +122,8 @@ static int move(struct jli_linear *l, const jl_mekf_model *model,
     return jl_vec_within(l->xp, n + m, JL_LARGE) ? JL_OK : JL_ENONFINITE;
 }
 
-/* G at x, y; scratch [N p] */
-static int drive(struct jli_linear *l, const jl_mekf_model *model,
-                 const jl_real *x, const jl_real *y, jl_real *scratch)
+int jli_mekf_drive(struct jli_linear *l, const jl_mekf_model *model,
+                   const jl_real *x, const jl_real *y, jl_real *scratch)
 {
     int n = model->n, m = model->m, p1 = model->p1, p2 = model->p2, status;
     int p = p1 + p2, all = n * p1 + m * p;
@@ -159,9 +157,8 @@ void jli_mekf_innovate(jl_real *nu, const jl_real *z, const jl_real *c,
         nu[i] = z[i] - nu[i];
 }
 
-/* c, H at xp; scratch [N + r n + 2 r] */
-static int sense(struct jli_linear *l, const jl_mekf_model *model,
-                 jl_real *scratch)
+int jli_mekf_sense(struct jli_linear *l, const jl_mekf_model *model,
+                   jl_real *scratch)
 {
     const jl_real *xp = l->xp;
     int n = model->n, N = n + model->m, r = model->r, status;
@@ -197,11 +194,11 @@ int jli_mekf_linearise(struct jli_linear *l, jl_real *mem,
     l->nu = l->xp + N;
     if (z != NULL && !jl_vec_within(z, r, JL_LARGE))
         return JL_ENONFINITE;
-    status = move(l, model, xhat, ybar, scratch);
+    status = jli_mekf_move(l, model, xhat, ybar, scratch);
     if (status == JL_OK)
-        status = drive(l, model, xbar, ybar, scratch);
+        status = jli_mekf_drive(l, model, xbar, ybar, scratch);
     if (status == JL_OK && z != NULL)
-        status = sense(l, model, scratch);
+        status = jli_mekf_sense(l, model, scratch);
     if (status == JL_OK && z != NULL)
         jli_mekf_innovate(l->nu, z, l->c, l->xp, n, r);
     return status;
