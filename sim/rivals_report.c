@@ -12,9 +12,9 @@ static const char *const situations[SITUATIONS] = {
     "as_modelled", "too_sure", "too_noisy"
 };
 static const char *const told[SITUATIONS] = {
-    "As modelled: the filters are told all variances as they are",
-    "Too sure: a hundredth of the parameter's variance at the start",
-    "Too noisy: a hundred times the variance of the states' noise"
+    "as modelled: the filters are told all variances as they are",
+    "too sure: a hundredth of the parameter's variance at the start",
+    "too noisy: a hundred times the variance of the states' noise"
 };
 
 /* --- table --------------------------------------------------------------- */
@@ -44,7 +44,7 @@ static void print_head(const struct rivals *r, FILE *out)
     const struct rivals_scenario *c = r->scenario;
 
     fprintf(out, "%s: %ld runs of %d steps, seed %llu, %s\n"
-            "%s: truly %g at the start, where the filters take it for %g.\n"
+            "%s:\ntruly %g at the start, where the filters take it for %g.\n"
             "Errors are estimate less truth; the MEKF's %s is xhat.  rms: over "
             "all steps and runs;\nfinal: at the last step; mean: of a run%s; "
             "+-: standard error over the runs.  Beside the\nEKF: a run's rms "
@@ -174,10 +174,6 @@ static int write_file(const struct rivals *r, const char *folder,
 static int plot(const struct rivals *r, const char *folder, const char *file,
                 int s, int q)
 {
-    static const char *const titles[SITUATIONS] = {
-        "as modelled", "the parameter's variance given as a hundredth",
-        "the states' noise given as a hundred times its variance"
-    };
     const struct rivals_scenario *c = r->scenario;
     struct plot_series series[RIVALS];
     char column[RIVALS][40], name[60], title[160], label[80];
@@ -187,14 +183,16 @@ static int plot(const struct rivals *r, const char *folder, const char *file,
         snprintf(column[f], sizeof column[f], "%s_%s_rms", columns[f],
                  quantities[q]);
         series[f] = (struct plot_series){ file, "t_s", column[f], names[f],
-                                          PLOT_LINE };
+                                          f == RIVAL_SPREAD ? PLOT_DASHES
+                                                            : PLOT_LINE };
     }
     snprintf(name, sizeof name, "%s_%s", quantities[q], situations[s]);
-    snprintf(title, sizeof title, "%s: error of the %s, %s", c->name,
-             c->quantity[q], titles[s]);
+    snprintf(title, sizeof title, "%s, error of the %s, %s", c->name,
+             c->quantity[q], told[s]);
     snprintf(label, sizeof label, "rms error of the %s%s%s", c->quantity[q],
              c->unit[q][0] != '\0' ? " in " : "", c->unit[q]);
-    return plot_errors(folder, name, title, label, series, RIVALS);
+    return (q == OF_STATE ? plot_curves : plot_errors)(folder, name, title,
+                                                       label, series, RIVALS);
 }
 
 static int draw(const struct rivals *r, const char *folder, int s)
