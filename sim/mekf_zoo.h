@@ -5,7 +5,11 @@
 
 #include "jumplink/mekf.h"
 
-enum { ZOO_R = 4 };                     /* spring2's most measurements */
+enum {                          /* the most of any model */
+    ZOO_STATES = 5,             /* n + m                                    */
+    ZOO_NOISES = 3,             /* p1 + p2                                  */
+    ZOO_R = 4                   /* of spring2, which may have fewer         */
+};
 
 /* The numbers of a model: each needs only those that it names below. */
 struct mekf_zoo {

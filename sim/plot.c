@@ -107,6 +107,10 @@ static void put_style(FILE *gp, enum plot_style style, int *lines)
         fprintf(gp, " with lines linewidth 1.6 linecolor '%s'",
                 colours[(*lines)++ % COLOURS]);
         break;
+    case PLOT_DASHES:
+        fprintf(gp, " with lines linewidth 1.6 dashtype (16,16) "
+                "linecolor '%s'", colours[(*lines)++ % COLOURS]);
+        break;
     case PLOT_TRUTH:
         fprintf(gp, " with lines linewidth 1.4 dashtype 2 "
                 "linecolor '#202020'");
@@ -310,8 +314,13 @@ int plot_errors(const char *folder, const char *name, const char *title,
     fprintf(out.stream,
             "set logscale y\n"
             "set format y '%%g'\n"
+            "set ytics ()\n"
+            "do for [e = -9:9] {\n"
+            "    set ytics add (10.0 ** e, 2 * 10.0 ** e, 5 * 10.0 ** e)\n"
+            "}\n"
             "set y2range [0:1]\n"
-            "set autoscale xfix\n");
+            "set autoscale xfix\n"
+            "set autoscale yfix\n");
     put_series(out.stream, series, count, "");
     return finish(&out, folder, name);
 }

@@ -6,6 +6,7 @@
 enum plot_style {
     PLOT_DOTS,                  /* measurements                             */
     PLOT_LINE,                  /* estimates                                */
+    PLOT_DASHES,                /* the same, for one that may hide another  */
     PLOT_TRUTH,                 /* what really was: thin and dashed         */
     PLOT_SHADE                  /* grey while y is not 0: lost measurements */
 };
