@@ -377,3 +377,39 @@ int plot_modes(const char *folder, const char *name, const char *title,
     put_lanes(out.stream, file, time, mode, M);
     return finish(&out, folder, name);
 }
+
+int plot_cells(const char *folder, const char *name, const char *title,
+               const char *file, const char *const *mode, int M, int cells,
+               int left)
+{
+    struct out_file out;
+    int j;
+
+    if (begin(&out, folder, name) != 0)
+        return -1;
+    put_head(out.stream, name, title, "tick", "cell, row by row");
+    fprintf(out.stream,
+            "set autoscale xfix\n"
+            "set yrange [%d.5:-0.5]\n"
+            "set style fill solid noborder\n"
+            "unset grid\n"
+            "set arrow 1 from graph 0, first %d.5 to graph 1, first %d.5 "
+            "nohead linecolor '#404040'\n"
+            "set label 1 'left triangle' at graph 1.02, first %d center "
+            "rotate textcolor '#707070'\n"
+            "set label 2 'right triangle, diamonds' at graph 1.02, first %d "
+            "center rotate textcolor '#707070'\n"
+            "plot", cells - 1, left - 1, left - 1, left / 2,
+            (left + cells) / 2);
+    for (j = 0; j < M; j++) {
+        fprintf(out.stream, "%s\\\n    ", j > 0 ? ", " : " ");
+        put_text(out.stream, file);
+        fprintf(out.stream, " using (column('tick')):"
+                "(strcol('mode') eq '%s' ? column('cell') : NaN):(0.45):(0.45)",
+                mode[j]);
+        put_title(out.stream, mode[j]);
+        fprintf(out.stream, " with boxxyerror linecolor '%s'",
+                colours[j % COLOURS]);
+    }
+    return finish(&out, folder, name);
+}

@@ -44,4 +44,10 @@ int plot_errors(const char *folder, const char *name, const char *title,
                 const char *y_label, const struct plot_series *series,
                 int count);
 
+/* What each of `cells` cells did in each tick: columns tick, cell, mode of a
+ * file; mode [M] are the names of the modes.  A line below the first `left`. */
+int plot_cells(const char *folder, const char *name, const char *title,
+               const char *file, const char *const *mode, int M, int cells,
+               int left);
+
 #endif
