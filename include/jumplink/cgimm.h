@@ -230,8 +230,8 @@ typedef struct jl_cg_adaptive {
 
 /* Gains low, high [2] (jl_cg_steady), smoothing c in (0, 1], 0 <= down <= up;
  * mem [cap], cap >= JL_CG_ADAPTIVE_STATE(axes).  x = 0, level 1.
- * Returns JL_OK, JL_EDIM (axes outside 1..JL_MAX_STATES), JL_ENOMEM, JL_ERANGE (gains
- * of no stable filter, or another argument); *f is untouched on error. */
+ * Returns JL_OK, JL_EDIM (axes outside 1..JL_MAX_STATES), JL_ENOMEM, JL_ERANGE
+ * (gains of no stable filter, or another argument); *f is untouched on error. */
 int jl_cg_adaptive_init(jl_cg_adaptive *f, int axes, jl_real T, jl_real R,
                         const jl_real *low, const jl_real *high, jl_real c,
                         jl_real up, jl_real down, jl_real *mem, int cap);

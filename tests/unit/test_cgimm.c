@@ -441,8 +441,8 @@ static void test_cgimm_survives_outliers(void **state)
         }
 }
 
-/* Mode 1 diverges where one measurement in twelve comes, and mode 0, which it is
- * mixed into, with it; until then all is finite, and then it stays. */
+/* Where one measurement in twelve comes modes of order 3 diverge, and what they
+ * are mixed into with them; all is finite until that is told, and after. */
 static void test_cgimm_tells_that_it_diverges(void **state)
 {
     static struct rig before;
