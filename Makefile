@@ -86,9 +86,10 @@ $(BUILD)/obj/%.o: %.c $(BUILD)/flags
 $(BUILD)/obj_f32/%.o: %.c $(BUILD)/flags
 	$(call compile,$(HOST) $(FLOAT))
 
-# Fixed sizes gain by unrolling; in sections, since each program wants its own.
-SIZES := %/src/kf/kf_sizes.o
-$(SIZES): private CFLAGS += -O3 -ffunction-sections -fdata-sections
+# Fixed sizes gain by unrolling, rotations by taking several numbers at once;
+# in sections, since each program wants its own sizes.
+FAST := %/src/kf/kf_sizes.o %/src/mat/mat_givens.o %/src/mat/givens_fixed.o
+$(FAST): private CFLAGS += -O3 -ffunction-sections -fdata-sections
 
 # Two notes that change only when what they say changes, so that other flags
 # or a source that is gone also rebuild what they concern.
@@ -250,12 +251,17 @@ $(BUILD)/bench/instructions: $(patsubst %,$(BUILD)/obj/tests/bench/%.o,instructi
     $(BUILD)/libsim.a $(BUILD)/libjumplink.a
 	@mkdir -p $(@D); echo '  $@'; $(CC) $(CFLAGS) $^ $(LIBS) -o $@
 
+$(BUILD)/bench/bench_givens: $(patsubst %,$(BUILD)/native/tests/bench/%.o,bench_givens givens_rivals) \
+    $(BUILD)/obj/tests/bench/bench_samples.o $(BUILD)/libsim.a $(BUILD)/native/libjumplink.a
+	@mkdir -p $(@D); echo '  $@'; $(CXX) $(CFLAGS) -pthread $^ $(LIBS) -llapack -lblas -o $@
+
 bench: deps
 	@CC='$(CC)' sh tests/check/deps.sh bench
 	$(AGAIN) run-bench
 
-run-bench: $(BENCHES) $(BUILD)/bench/bench_sizes $(BUILD)/bench/instructions
-	@for b in $(BENCHES) $(BUILD)/bench/bench_sizes; do $$b $(BUILD)/bench || exit 1; done
+BENCHES += $(BUILD)/bench/bench_sizes $(BUILD)/bench/bench_givens
+run-bench: $(BENCHES) $(BUILD)/bench/instructions
+	@for b in $(BENCHES); do $$b $(BUILD)/bench || exit 1; done
 	@sh tests/bench/instructions.sh $(BUILD)/bench/instructions $(BUILD)/bench/instructions.csv
 	@cd $(BUILD)/bench && gnuplot '$(CURDIR)/tests/bench/latency.gp' '$(CURDIR)/tests/bench/break_even.gp'
 	@echo 'CSV and plots: $(BUILD)/bench'

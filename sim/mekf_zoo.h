@@ -17,7 +17,8 @@ struct mekf_zoo {
 
 /* A model by its name, with all its derivatives:
  *     ar1      n 1, m 1, r 1   f = y;  c = 1;  G1 = 1
- *     spring2  n 2, m 1, r 1-4 f = [1 T; -T y, 1 - T d];  c = C [r,2];  G1 = [0; 1]
+ *     spring2  n 2, m 1, r 1-4  f = [1 T; -T y, 1 - T d];  c = C [r,2];
+ *                              G1 = [0; 1]
  *     ct4pos   n 4, m 1, r 2   x = px vx py vy, turned by y T: coordinated
  *                              turn of the rate y;  c picks px, py;  G1 =
  *                              [T^2/2 0; T 0; 0 T^2/2; 0 T]

@@ -152,7 +152,8 @@ int jl_cgimm_init(jl_cgimm *cg, int M, const jl_cg_gains *gains, int axes,
 
 /* Set the state: x [M,axes,order] of all modes, axis by axis p, v and, if a mode
  * has order 3, a; mu [M] or NULL (uniform).  Gains go to their start.
- * Returns JL_OK, JL_ENONFINITE, JL_EPROB; unchanged on error. */
+ * Returns JL_OK, JL_ENONFINITE (or v T, a T^2 / 2 beyond JL_LARGE), JL_EPROB;
+ * unchanged on error. */
 int jl_cgimm_set(jl_cgimm *cg, const jl_real *x, const jl_real *mu);
 
 /* Let mode j's gains start again, as when a target is met anew.  Ends a step

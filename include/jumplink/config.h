@@ -48,6 +48,12 @@
 #define JL_KF_SIZES_FILE "jumplink/kf_sizes.def"
 #endif
 
+/* Likewise of arrays that become triangles (mat.h): JL_GIVENS_SIZE(rows, cols).
+ * Who names jl_mat_givens_fixed pays for all of them. */
+#ifndef JL_GIVENS_SIZES_FILE
+#define JL_GIVENS_SIZES_FILE "jumplink/givens_sizes.def"
+#endif
+
 /* Processing elements of one run.  Each costs ten octets of a jl_par, so the
  * library and its users must agree. */
 #ifndef JL_MAX_PES

@@ -66,6 +66,13 @@ void jl_mat_ud_product(jl_real *P, const jl_real *S, int n);
  *                                           2 cols^2 (rows - cols / 3)      */
 void jl_mat_givens(jl_real *A, int rows, int cols);
 
+/* jl_mat_givens of fixed size, with the same bits, for the sizes that
+ * givens_sizes.def lists: those of a pre-array of n + m states and parameters,
+ * as many noises, r measurements are 2 (n + m) + r by n + m + r.  Else
+ * jl_mat_givens. */
+typedef void jl_givens(jl_real *A, int rows, int cols);
+jl_givens *jl_mat_givens_fixed(int rows, int cols);
+
 /* --- symmetric --------------------------------------------------------- */
 
 /* Packed upper triangle, row by row: p [n(n+1)/2]. */

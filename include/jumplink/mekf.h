@@ -148,8 +148,8 @@ void jl_mekf_cov(const jl_mekf *filter, jl_real *P, jl_real *P1);
  *     [x; y] = [f x; h] + K (z - c xp),  P = Pp - K S K'
  * Measurements that are much better than what is known (tests/golden/mekf,
  * stress32 and stress32_ct4: R / P 6e-8 and 1e-10) cost it digits: there its
- * variances are wrong by 3e-9 and 2e-6 of themselves, MEKF's by 1e-12; in float
- * by 0.5 and 800, MEKF's by 8e-4. */
+ * variances are wrong by 3e-9 and 2e-6 of themselves, MEKF's by 6e-13; in float
+ * by 0.5 and 800, MEKF's by 4e-4. */
 typedef struct jl_ekf {
     const jl_mekf_model *model;
     jl_real *x;                 /* [n+m]                                    */

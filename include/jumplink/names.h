@@ -26,6 +26,8 @@
 #define jl_mat_ud jl_mat_ud_f32
 #define jl_mat_ud_product jl_mat_ud_product_f32
 #define jl_mat_givens jl_mat_givens_f32
+#define jl_mat_givens_fixed jl_mat_givens_fixed_f32
+#define jl_givens jl_givens_f32
 #define jl_mat_pack jl_mat_pack_f32
 #define jl_mat_unpack jl_mat_unpack_f32
 #define jl_vec_within jl_vec_within_f32

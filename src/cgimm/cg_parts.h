@@ -71,8 +71,9 @@ JL_INLINE void jli_cg_unweighed(jl_cgimm *cg, jl_real all)
 }
 
 /* End a weighing: the new weights add up to `all`, to be multiplied by mode
- * `best`'s likelihood, of the sum `sum`.  They are not divided by it, so that the next step need not wait
- * for a division, and multiplied only by powers of 2. */
+ * `best`'s likelihood, of the sum `sum`.  They are not divided by it, so that
+ * the next step need not wait for a division, and multiplied only by powers
+ * of 2. */
 JL_INLINE void jli_cg_weighed(jl_cgimm *cg, jl_real all, int best,
                               jl_real sum)
 {

@@ -129,7 +129,8 @@ int jl_cgimm_set(jl_cgimm *cg, const jl_real *x, const jl_real *mu)
 
     for (i = 0; i < M * axes * order; i += order) {
         scaled(s, x + i, order, cg->T);
-        if (!jl_vec_within(x + i, order, JL_LARGE) || !jl_vec_within(s, 3, JL_LARGE))
+        if (!jl_vec_within(x + i, order, JL_LARGE)
+            || !jl_vec_within(s, 3, JL_LARGE))
             return JL_ENONFINITE;
     }
     status = jl_chain_check(NULL, mu, M);

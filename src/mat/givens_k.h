@@ -6,52 +6,64 @@
 #include "base/mathx.h"
 #include "jumplink/mat.h"
 
-/* Two tiny numbers times this, a power of two, have squares that are normal. */
+/* Below this a sum of squares may have lost digits to underflow, and a tiny
+ * number times JLI_MAGNIFY has a normal square. */
+#define JLI_FEW (JL_REAL_MIN / JL_EPSILON)
 #define JLI_MAGNIFY (JL_EPSILON / JL_REAL_MIN)
 
-/* The rotation that takes (r, x), x not 0, to (r', 0), r' > 0: c = r / r',
- * s = x / r'.  Returns r'. */
-JL_INLINE jl_real jli_rotation(jl_real *c, jl_real *s, jl_real r, jl_real x)
+/* |(r, x)| of tiny numbers; *c, *s as in jli_givens. */
+JL_INLINE jl_real jli_tiny_rotation(jl_real *c, jl_real *s, jl_real r,
+                                    jl_real x)
 {
-    jl_real sum = r * r + x * x, scale = 1, length;
+    jl_real length;
 
-    if (sum < 1 / JLI_MAGNIFY) {
-        scale = JLI_MAGNIFY;
-        r *= scale;
-        x *= scale;
-        sum = r * r + x * x;
-    }
-    length = jli_sqrt(sum);
+    r *= JLI_MAGNIFY;
+    x *= JLI_MAGNIFY;
+    length = jli_sqrt(r * r + x * x);
     *c = r / length;
     *s = x / length;
-    return length / scale;
+    return length / JLI_MAGNIFY;
 }
 
 /* Column by column, and down each: what a row meets, and in which order, is
  * what it meets in a triangle of cells that is fed row by row (Gentleman, Kung
- * 1981, Matrix Triangularization by Systolic Arrays). */
+ * 1981, Matrix Triangularization by Systolic Arrays).
+ * A rotation takes (r, x) to (r', 0): c = r / r', s = x / r'.  r'^2 is kept
+ * beside r', so that the next rotation's root need not wait for this one's. */
 JL_INLINE void jli_givens(jl_real *A, int rows, int cols)
 {
     int i, j, k;
 
     for (j = 0; j < rows && j < cols; j++) {
         jl_real *top = A + j * cols;
+        jl_real r = top[j], sum = r * r;
 
         for (i = j + 1; i < rows; i++) {
-            jl_real *row = A + i * cols, c, s;
+            jl_real *row = A + i * cols, x = row[j], length, c, s;
 
-            if (row[j] == 0)
+            if (x == 0)
                 continue;
-            top[j] = jli_rotation(&c, &s, top[j], row[j]);
+            sum += x * x;
+            if (sum < JLI_FEW) {
+                length = jli_tiny_rotation(&c, &s, r, x);
+                sum = length * length;
+            } else {
+                length = jli_sqrt(sum);
+                s = 1 / length;
+                c = r * s;
+                s *= x;
+            }
+            r = length;
             row[j] = 0;
             for (k = j + 1; k < cols; k++) {
-                jl_real r = top[k], x = row[k];
+                jl_real t = top[k], y = row[k];
 
-                top[k] = c * r + s * x;
-                row[k] = c * x - s * r;
+                top[k] = c * t + s * y;
+                row[k] = c * y - s * t;
             }
         }
-        if (top[j] < 0)
+        top[j] = r;
+        if (r < 0)
             for (k = j; k < cols; k++)
                 top[k] = -top[k];
     }

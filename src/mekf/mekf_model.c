@@ -19,7 +19,7 @@ static void put(jl_real *A, int width, const jl_real *B, int rows, int cols)
         jli_copy(A + i * width, B + i * cols, cols);
 }
 
-/* --- functions of one vector, for differences ----------------------------- */
+/* --- functions of one vector, for differences ---------------------------- */
 
 struct part {
     const jl_mekf_model *model;
@@ -59,7 +59,7 @@ static int cx(jl_real *out, const jl_real *at, void *context)
     return status;
 }
 
-/* --- the state's motion ---------------------------------------------------- */
+/* --- the state's motion -------------------------------------------------- */
 
 static int move_x(jl_real *xp, jl_real *F, const jl_mekf_model *model,
                   const jl_real *x, const jl_real *y, jl_real *scratch)
@@ -137,7 +137,7 @@ int jli_mekf_drive(struct jli_linear *l, const jl_mekf_model *model,
     return jli_checked(status, G1, all);
 }
 
-/* --- what is measured ------------------------------------------------------ */
+/* --- what is measured ---------------------------------------------------- */
 
 int jli_mekf_c(jl_real *c, const jl_mekf_model *model, const jl_real *x,
                const jl_real *y)
@@ -176,7 +176,7 @@ int jli_mekf_sense(struct jli_linear *l, const jl_mekf_model *model,
     return jli_checked(status, l->H, r * N);
 }
 
-/* --- all of it ------------------------------------------------------------- */
+/* --- all of it ----------------------------------------------------------- */
 
 int jli_mekf_linearise(struct jli_linear *l, jl_real *mem,
                        const jl_mekf_model *model, const jl_real *xhat,

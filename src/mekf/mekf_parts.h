@@ -15,7 +15,7 @@
 #endif
 
 /* Sizes and covariances as an init is given them: JL_OK, JL_EDIM,
- * JL_ENONFINITE, JL_EASYM, JL_EDEF.  scratch [p p + r r] */
+ * JL_ENONFINITE, JL_EASYM, JL_EDEF.  scratch [max(p p, r r)] */
 int jli_mekf_check(const jl_mekf_model *model, const jl_real *Q,
                    const jl_real *R, jl_real *scratch);
 

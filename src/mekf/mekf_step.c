@@ -46,8 +46,8 @@ static void add(struct array *a, const jl_real *L, int lw, const jl_real *M,
     }
 }
 
-/* The triangle of A, and x [n] += W' V^-1 nu, W = V^-1 H Pp: what the array does
- * with a last row [-nu' | x'], by Gauss (Faddeev).  nu [r] is used up.
+/* The triangle of A, and x [n] += W' V^-1 nu, W = V^-1 H Pp: what the array
+ * does with a last row [-nu' | x'], by Gauss (Faddeev).  nu [r] is used up.
  * A singular V shows by what rounding leaves of its diagonal. */
 static int solve(struct array *a, jl_real *x, jl_real *nu)
 {
@@ -76,6 +76,7 @@ static int solve(struct array *a, jl_real *x, jl_real *nu)
     return jl_vec_within(x, a->n, JL_LARGE) ? JL_OK : JL_ENONFINITE;
 }
 
+/* U out of the triangle */
 static void take(jl_real *U, const struct array *a)
 {
     int r = a->r, n = a->n, i;

@@ -23,8 +23,8 @@
  * (x, P) are predicted only.  The verdict is 0 if the status is not.  FAULT
  * names the PE (npe: the host) that cannot be gone on with.
  *
- * A constant-gain IMM has no P, and in MODES the axes' sum of (1 - alpha) nu^2 in the place
- * of l, and x as it keeps it: axis by axis p, v T and, of order 3, a T^2 / 2.
+ * A constant-gain IMM has no P, and in MODES, in the place of l, the axes' sum
+ * of (1 - alpha) nu^2, and x as it keeps it: axis by axis p, v T and, of order 3, a T^2 / 2.
  * Types of its own, for an IMM's message may have the same length.
  */
 #ifndef JL_PAR_MSG_H

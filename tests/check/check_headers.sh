@@ -18,7 +18,7 @@ for suffix in '' _f32; do
     echo '#include "jumplink.h"' >"$build/all.c"
     gcc $flags -aux-info "$build/prototypes" -fsyntax-only "$build/all.c"
     {
-        sed -n 's/^.*\*\/ extern [^(]*\<\(jl[a-z0-9_]*\) (.*/\1/p' "$build/prototypes"
+        sed -n 's/^.*\*\/ extern [^(]*(*\**\<\(jl[a-z0-9_]*\) (.*/\1/p' "$build/prototypes"
         gcc $flags -E -P "$build/all.c" | sed 's/; */;\n/g' |
             sed -n 's/^extern [^(]*\<\(jl[a-z0-9_]*\);$/\1/p'
     } | sort -u >"$build/declared"

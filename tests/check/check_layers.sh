@@ -137,7 +137,7 @@ function check(line, from,    name, to, list, h) {
                 list = ""
         if (!index(list, " * "))
             complain("may not include <" name ">")
-    } else if (name !~ /^JL_(CONFIG|REAL|KF_SIZES)_FILE$/)
+    } else if (name !~ /^JL_(CONFIG|REAL|KF_SIZES|GIVENS_SIZES)_FILE$/)
         complain("includes what only the preprocessor knows")
 }
 

@@ -17,6 +17,7 @@ test      iproute2                   ip
 bench     g++                        g++
 bench     valgrind                   valgrind
 bench     libeigen3-dev              c++:eigen3/Eigen/Dense
+bench     liblapack-dev              lib:lapack
 fuzz      clang                      clang
 fuzz      libclang-rt-14-dev         clang:fuzzer
 check     binutils                   objdump
@@ -30,6 +31,8 @@ check     libnewlib-arm-none-eabi    arm:math.h
 there() {
     case $1 in
     arm:*) echo "#include <${1#arm:}>" | arm-none-eabi-gcc -E - ;;
+    lib:*) echo 'int main(void) { return 0; }' |
+        ${CC:-cc} -x c - "-l${1#lib:}" -o /dev/null ;;
     c++:*) echo "#include <${1#c++:}>" | g++ -x c++ -E - ;;
     clang:*) echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' |
         clang "-fsanitize=${1#clang:}" -x c - -o /dev/null ;;

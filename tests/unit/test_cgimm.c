@@ -606,6 +606,12 @@ static void test_cgimm_refuses_what_is_not_finite(void **state)
             x[at] = 0;
         }
     }
+    rig.cg.T = 8;               /* fits as it is given, not times T^2 / 2 */
+    before = rig;
+    x[11] = JL_LARGE / 8;
+    assert_int_equal(jl_cgimm_set(&rig.cg, x, NULL), JL_ENONFINITE);
+    check_untouched(&before);
+    x[11] = 0;
     assert_int_equal(jl_cgimm_set(&rig.cg, x, short_mu), JL_EPROB);
     check_untouched(&before);
     assert_int_equal(jl_cgimm_set(&rig.cg, x, low_mu), JL_EPROB);

@@ -11,7 +11,7 @@
 #define INF_ ((jl_real)INFINITY)
 #define EDGE 3
 
-/* --- a model of any size -------------------------------------------------- */
+/* --- a model of any size ------------------------------------------------- */
 
 /* What goes wrong with which call of a function. */
 enum fault { A_CODE, A_NAN, TOO_LARGE, FAULTS };
@@ -181,7 +181,7 @@ static void odd_init(struct odd *odd, int n, int m, int r, int p1, int p2,
     }
 }
 
-/* --- a filter whose memory's edges are watched ------------------------------ */
+/* --- a filter whose memory's edges are watched --------------------------- */
 
 struct rig {
     struct odd odd;
@@ -348,7 +348,7 @@ static void let_go(struct kept *kept)
     free(kept->mem[1]);
 }
 
-/* --- memory ----------------------------------------------------------------- */
+/* --- memory -------------------------------------------------------------- */
 
 /* Upper, and the diagonal not below 0. */
 static void check_factor(const jl_real *U, int n)
@@ -416,7 +416,7 @@ static void test_mekf_without_measurement_leaves_c_alone(void **state)
     rig_close(&rig);
 }
 
-/* --- state ------------------------------------------------------------------ */
+/* --- state --------------------------------------------------------------- */
 
 static void check_near(const jl_real *A, const jl_real *B, int n, int stride)
 {
@@ -503,7 +503,7 @@ static void test_mekf_semidefinite(void **state)
     rig_close(&rig);
 }
 
-/* --- refusals ----------------------------------------------------------------- */
+/* --- refusals ------------------------------------------------------------ */
 
 static void test_mekf_init_refuses_sizes(void **state)
 {
@@ -746,7 +746,7 @@ static void test_mekf_refuses_large_deviations(void **state)
     rig_close(&rig);
 }
 
-/* --- a singular V ------------------------------------------------------------- */
+/* --- a singular V -------------------------------------------------------- */
 
 struct rows {
     int r;
