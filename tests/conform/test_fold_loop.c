@@ -322,25 +322,41 @@ static void test_fold_init_refuses_what_does_not_fit(void **state)
 #undef REFUSED
 }
 
-static void test_fold_deal_covers_all_rows(void **state)
+/* Numbers that the rotations of row j take part in. */
+static long work_of(const jl_mekf_model *t, int j)
 {
-    int npe, model, rows[JL_MAX_PES + 1], i;
+    int n = t->n, r = t->r, N = n + t->m;
+
+    return (long)(r + N + t->p1 + t->p2 - j) * (r + N - j)
+        + (j < r + n ? (long)(r + n + t->p1 - j) * (r + n - j) : 0);
+}
+
+/* Each border is the first at which the PEs before it have their share. */
+static void test_fold_deal_shares_the_work(void **state)
+{
+    int npe, model, rows[JL_MAX_PES + 1], pe, j;
 
     (void)state;
     for (model = 0; model < FOLD_MODELS; model++)
         for (npe = 1; npe <= JL_MAX_PES; npe++) {
-            struct fold_pe *t = &run.pe[0];
-            const struct fold_size *size = &fold_sizes[model];
-            int N = size->n + size->m + size->r;
+            const jl_mekf_model *t = &run.pe[0].model.model;
+            int N = fold_sizes[model].n + fold_sizes[model].m
+                + fold_sizes[model].r;
+            long total = 0, sum = 0;
 
-            fold_model(&t->model, plain(npe, model));
-            jl_fold_deal(rows, npe, &t->model.model);
+            fold_model(&run.pe[0].model, plain(npe, model));
+            jl_fold_deal(rows, npe, t);
+            for (j = 0; j < N; j++)
+                total += work_of(t, j);
             assert_int_equal(rows[0], 0);
             assert_int_equal(rows[npe], N);
-            for (i = 0; i < npe; i++) {
-                assert_true(rows[i] <= rows[i + 1]);
-                /* the first rows are the longest */
-                assert_true(npe == 1 || rows[1] <= 1 + N / npe);
+            for (pe = 1, j = 0; pe < npe; pe++) {
+                assert_true(rows[pe] >= rows[pe - 1]);
+                for (; j < rows[pe]; j++)
+                    sum += work_of(t, j);
+                assert_true(npe * sum >= pe * total - npe * npe);
+                assert_true(j == 0 || npe * (sum - work_of(t, j - 1))
+                            < pe * total);
             }
         }
 }
@@ -356,7 +372,7 @@ int main(void)
         cmocka_unit_test(test_fold_blames_the_pe_that_left),
         cmocka_unit_test(test_fold_believes_no_odd_pe),
         cmocka_unit_test(test_fold_init_refuses_what_does_not_fit),
-        cmocka_unit_test(test_fold_deal_covers_all_rows),
+        cmocka_unit_test(test_fold_deal_shares_the_work),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);
