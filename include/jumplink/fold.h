@@ -101,8 +101,8 @@ int jl_fold_init(jl_fold *fold, jl_mekf *filter, const jl_fold_config *config,
                  unsigned char *buf, int cap);
 
 /* A step on every PE.  z [r], or NULL: no measurement; PE0's counts, the
- * others' is not looked at.  f, h, G, df, dh are called on every PE, c and dc on
- * PE0.  scratch [JL_FOLD_SCRATCH]
+ * others' is not looked at.  f, h, G, df, dh are called on every PE, c and dc
+ * on PE0.  scratch [JL_FOLD_SCRATCH]
  * Returns, on all PEs the same, JL_OK or jl_mekf_step's code, the filter being
  * unchanged then; or JL_FOLD_OVER, when PE0 has called jl_fold_stop; or the
  * error of a channel (JL_EMSG, JL_ELENGTH: a message that does not belong

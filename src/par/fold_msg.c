@@ -19,7 +19,7 @@ static int check(const jl_fold *fold, int type, int len)
         ? JL_EMSG : JL_OK;
 }
 
-/* --- products -------------------------------------------------------------- */
+/* --- products ------------------------------------------------------------- */
 
 /* Reals of the products of states first .. N-1. */
 static int products_of(const jl_mekf *f, int first)
@@ -118,7 +118,7 @@ void jli_fold_products_take(const jl_fold *fold, struct jli_folded *w,
             }
 }
 
-/* --- arrays ---------------------------------------------------------------- */
+/* --- arrays --------------------------------------------------------------- */
 
 void jli_fold_shape(struct jli_folded *w, const jl_fold *fold, int r)
 {
@@ -138,16 +138,17 @@ void jli_fold_shape(struct jli_folded *w, const jl_fold *fold, int r)
     }
 }
 
-/* Those from row b on, and the feed. */
-static int reals_of(const struct jli_array *a, int b)
-{
-    return (a->rows - b) * (a->r + a->n - b)
-        + 2 * (a->r > b ? a->r - b : 0) + a->n;
-}
-
+/* What S and nu have left at row b. */
 static int later(int b, int r)
 {
     return b < r ? r - b : 0;
+}
+
+/* The rows from b on, and the feed. */
+static int reals_of(const struct jli_array *a, int b)
+{
+    return (a->rows - b) * (a->r + a->n - b)
+        + 2 * later(b, a->r) + a->n;
 }
 
 int jli_fold_arrays(const jl_fold *fold, const struct jli_folded *w)
@@ -226,7 +227,7 @@ int jli_fold_arrays_read(struct jli_folded *w, const jl_fold *fold, int len)
     return p == end ? JL_OK : JL_ELENGTH;
 }
 
-/* --- verdict --------------------------------------------------------------- */
+/* --- verdict -------------------------------------------------------------- */
 
 int jli_fold_verdict(const jl_fold *fold, const struct jli_folded *w,
                      int status)

@@ -7,7 +7,7 @@
  *                                         behind it: its row of U F'; if it is
  *                                         one of x, of U1 f'; with spread, of
  *                                         U J'.  Nothing if status is not 0
- *     ARRAYS    which  -         seq      of A, B, as far as `which` says: -status
+ *     ARRAYS    which  -         seq      of A, B, if `which` has it: -status
  *                                         (16 bits); S, nu, x, the rows that
  *                                         are left; nothing if its status or
  *                                         that of one before it is not 0
@@ -26,6 +26,13 @@
 #define jli_fold_recv jli_fold_recv_f32
 #define jli_fold_fault jli_fold_fault_f32
 #define jli_fold_tell_fault jli_fold_tell_fault_f32
+#define jli_fold_receive jli_fold_receive_f32
+#define jli_fold_begin jli_fold_begin_f32
+#define jli_fold_pass_products jli_fold_pass_products_f32
+#define jli_fold_choose jli_fold_choose_f32
+#define jli_fold_pass_stop jli_fold_pass_stop_f32
+#define jli_fold_round jli_fold_round_f32
+#define jli_fold_own_rows jli_fold_own_rows_f32
 #define jli_fold_states jli_fold_states_f32
 #define jli_fold_border jli_fold_border_f32
 #define jli_fold_shape jli_fold_shape_f32
@@ -65,7 +72,7 @@ void jli_fold_states(const jl_fold *fold, int pe, int *first, int *end);
 int jli_fold_border(const jl_fold *fold, const struct jli_array *a, int i,
                     int pe);
 
-/* --- fold_msg.c ------------------------------------------------------------ */
+/* --- fold_msg.c ----------------------------------------------------------- */
 
 /* Sizes of both arrays with r measurements or 0. */
 void jli_fold_shape(struct jli_folded *w, const jl_fold *fold, int r);
@@ -91,7 +98,39 @@ int jli_fold_verdict(const jl_fold *fold, const struct jli_folded *w,
 int jli_fold_verdict_read(int *status, struct jli_folded *w,
                           const jl_fold *fold, int len);
 
-/* --- fold_chain.c ---------------------------------------------------------- */
+/* --- fold_phases.c -------------------------------------------------------- */
+
+/* Those that return a status: JL_OK, or the error of a channel, unless
+ * something else is said; what goes wrong in the filter is w->status. */
+
+/* The products of the PEs behind into the buffer [*len, none: 0]; *status: what
+ * they report. */
+int jli_fold_receive(jl_fold *fold, int *status, int *len);
+
+/* PE0 makes the arrays of its own products and the others'; or, in place of
+ * them, there is a status that is not JL_OK. */
+int jli_fold_begin(jl_fold *fold, struct jli_folded *w, const jl_real *z,
+                   int status);
+
+/* The other PEs pass products on, and wait for PE0 as long as it takes. */
+int jli_fold_pass_products(jl_fold *fold, const struct jli_folded *w,
+                           int status);
+
+/* PE0: c of B and what it makes of B's array; returns B's status. */
+int jli_fold_choose(const jl_fold *fold, struct jli_folded *w,
+                    const jl_real *z);
+
+/* PE0 says, or another passes on, that there are no more steps. */
+int jli_fold_pass_stop(jl_fold *fold);
+
+/* Arrays down, verdict up; `first` of a step.  Also returns JL_FOLD_OVER. */
+int jli_fold_round(jl_fold *fold, struct jli_folded *w, int first,
+                   int *verdict);
+
+/* How many rows of filter i's triangle this PE owns. */
+int jli_fold_own_rows(const jl_fold *fold, const struct jli_folded *w, int i);
+
+/* --- fold_chain.c --------------------------------------------------------- */
 
 /* A message of the buffer's first half to a neighbour; one into the second
  * half, whose length is returned.  Else a code that is also in fold->failed. */

@@ -254,7 +254,8 @@ static int fold_is_same(const jl_mekf *a, const jl_mekf *b, const int *own)
     int n = a->model->n, N = n + a->model->m, r = a->model->r;
     int from = clip(own[0] - r, N), to = clip(own[1] - r, N);
 
-    return same_rows(a->x, b->x, 0, 1, N) && same_rows(a->xhat, b->xhat, 0, 1, n)
+    return same_rows(a->x, b->x, 0, 1, N)
+        && same_rows(a->xhat, b->xhat, 0, 1, n)
         && same_rows(a->U, b->U, from, to, N)
         && same_rows(a->U1, b->U1, clip(from, n), clip(to, n), n);
 }

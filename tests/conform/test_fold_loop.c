@@ -1,5 +1,5 @@
 /* The folded MEKF on port loop: the serial bits for any number of PEs and any
- * borders, the octets that fold.h says, and all or none when something fails. */
+ * borders, the octets that fold.h says, and all or none if something fails. */
 #include "fold_case.h"
 
 #include "loop/port_loop.h"
