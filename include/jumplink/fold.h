@@ -23,10 +23,10 @@
  * The rows meet each other as in jl_mekf_step, by the same code: the same bits
  * for any number of PEs, any borders, any transport.
  *
- * What it is for: a filter whose triangles are too large for one PE's memory of
- * rows, or a model of the array.  It does not shorten a step: as a phase is one
- * message, a PE begins when the one before it has done; what overlaps is the
- * multiplication with the wait for the next measurement.
+ * What it is for: to run the array's data flow, counted, on real PEs; not for
+ * speed.  All PEs multiply at once, while PE0 waits for its measurement; but as
+ * a phase is one message, a PE begins its rotations when the one before it has
+ * done.  Every PE has the memory of a whole filter.
  *
  * Octets of the messages on the link at left row b, with o octets a real,
  * N = n + m, p = p1 + p2, b1 = min(b, r+n); s = 1, q = N with `spread`, else 0:

@@ -58,28 +58,31 @@ static void multiply(jl_real *out, const struct product *t, int N)
     jli_array_products(out, t->n, t->L, t->inner, t->M, N, 1, t->n, t->inner);
 }
 
-int jli_fold_products(const jl_fold *fold, const struct jli_folded *w,
-                      int status, int len)
+int jli_fold_products(const jl_fold *fold, const struct jli_folded *w)
 {
     unsigned char *p = JLI_OUT(fold);
     int N = fold->filter->model->n + fold->filter->model->m, k, end, i;
     struct product t;
 
-    p += header(fold, JLI_PRODUCTS, fold->config.pe, status);
-    if (status != JL_OK)
-        return JLI_MSG_HEADER;
+    p += header(fold, JLI_PRODUCTS, fold->config.pe, JL_OK);
     for (jli_fold_states(fold, fold->config.pe, &k, &end); k < end; k++)
         for (i = 0; i < 3; i++)
             if (product_of(&t, i, k, fold, w)) {
                 multiply(w->mem[0], &t, N);
                 p = jl_put_reals(p, w->mem[0], t.n);
             }
-    if (len > JLI_MSG_HEADER) {
-        len -= JLI_MSG_HEADER;
-        memcpy(p, JLI_IN(fold) + JLI_MSG_HEADER, (size_t)len);
-        p += len;
-    }
     return (int)(p - JLI_OUT(fold));
+}
+
+int jli_fold_products_join(const jl_fold *fold, int own, int status, int len)
+{
+    if (status != JL_OK)
+        return header(fold, JLI_PRODUCTS, fold->config.pe, status);
+    if (len == 0)
+        return own;
+    len -= JLI_MSG_HEADER;
+    memcpy(JLI_OUT(fold) + own, JLI_IN(fold) + JLI_MSG_HEADER, (size_t)len);
+    return own + len;
 }
 
 int jli_fold_products_read(int *status, const jl_fold *fold, int len)

@@ -36,6 +36,7 @@
 #define jli_fold_states jli_fold_states_f32
 #define jli_fold_border jli_fold_border_f32
 #define jli_fold_shape jli_fold_shape_f32
+#define jli_fold_products_join jli_fold_products_join_f32
 #define jli_fold_products_read jli_fold_products_read_f32
 #define jli_fold_products_take jli_fold_products_take_f32
 #define jli_fold_products jli_fold_products_f32
@@ -81,9 +82,12 @@ void jli_fold_shape(struct jli_folded *w, const jl_fold *fold, int r);
  * Each _read has one [len] in the second half and returns JL_OK, JL_EMSG or
  * JL_ELENGTH. */
 
-/* Own products, then those in the second half [len, 0: none]. */
-int jli_fold_products(const jl_fold *fold, const struct jli_folded *w,
-                      int status, int len);
+/* The own products. */
+int jli_fold_products(const jl_fold *fold, const struct jli_folded *w);
+
+/* ... [own], and behind them those that came [len, 0: none]; or the status. */
+int jli_fold_products_join(const jl_fold *fold, int own, int status, int len);
+
 int jli_fold_products_read(int *status, const jl_fold *fold, int len);
 
 /* The products [len] into the arrays, whose rows for them begin at row r. */

@@ -87,14 +87,17 @@ int jli_fold_begin(jl_fold *fold, struct jli_folded *w, const jl_real *z,
     return JL_OK;
 }
 
+/* All multiply at once, and wait for each other then. */
 int jli_fold_pass_products(jl_fold *fold, const struct jli_folded *w,
                            int status)
 {
-    int len, theirs, failed = jli_fold_receive(fold, &theirs, &len);
+    int own = status == JL_OK ? jli_fold_products(fold, w) : 0, len, theirs;
+    int failed = jli_fold_receive(fold, &theirs, &len);
 
     if (failed != JL_OK)
         return failed;
-    len = jli_fold_products(fold, w, status != JL_OK ? status : theirs, len);
+    len = jli_fold_products_join(fold, own, status != JL_OK ? status : theirs,
+                                 len);
     return jli_fold_send(fold, fold->config.pe - 1, len, JL_FOREVER);
 }
 

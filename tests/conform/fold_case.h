@@ -33,6 +33,7 @@ struct fold_shape {
     const int *rows;            /* NULL: jl_fold_deal                       */
     int fail, fail_pe;          /* which function; -1: on every PE          */
     int leaves;                 /* a PE that leaves at FOLD_FAILS_AT, or -1 */
+    int hangs;                  /* ... not at once, but long after the rest */
 };
 
 /* Models: those of the zoo, then random ones, f and c linear in y. */
@@ -391,8 +392,12 @@ static int fold_pe(struct fold_pe *t, int pe, const struct fold_shape *s,
         return fold_wrong("init", pe, -1, 0);
     for (k = 0; k < FOLD_STEPS && bad == 0; k++) {
         fold_random(z, FOLD_R, &state);
-        if (pe == s->leaves && k == FOLD_FAILS_AT)
+        if (pe == s->leaves && k == FOLD_FAILS_AT) {
+            if (s->hangs)       /* nothing ever comes from there */
+                (void)jl_chan_recv(from[(pe + 2) % s->npe], NULL, 0,
+                                   20 * LONG_US);
             return 0;
+        }
         bad += fold_both(t, s, k, k == FOLD_MISSING ? NULL : z);
     }
     if (bad > 0)

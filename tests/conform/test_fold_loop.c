@@ -177,6 +177,30 @@ static void test_fold_blames_the_pe_that_left(void **state)
         }
 }
 
+/* By its deadlines PE0 knows, and all between; those behind know when the PE is
+ * gone, since they wait for PE0 without limit. */
+static void test_fold_blames_the_pe_that_hangs(void **state)
+{
+    int slots, hung, pe;
+
+    (void)state;
+    for (slots = 0; slots < 2; slots++)
+        for (hung = 1; hung < 5; hung++) {
+            struct fold_shape *s = plain(5, 5);
+
+            s->leaves = hung;
+            s->hangs = 1;
+            play(&run, slots);
+            jl_loop_free(run.loop);
+            for (pe = 0; pe < 5; pe++)
+                if (pe != hung) {
+                    assert_int_equal(run.pe[pe].fold.failed,
+                                     pe < hung ? JL_ETIMEOUT : JL_ECLOSED);
+                    assert_int_equal(run.pe[pe].fold.failed_pe, hung);
+                }
+        }
+}
+
 /* --- a neighbour that says what does not belong here ---------------------- */
 
 enum { OFF = -1 };
@@ -370,6 +394,7 @@ int main(void)
         cmocka_unit_test(test_fold_fails_for_all_or_none),
         cmocka_unit_test(test_fold_fails_for_all_if_one_pe_does),
         cmocka_unit_test(test_fold_blames_the_pe_that_left),
+        cmocka_unit_test(test_fold_blames_the_pe_that_hangs),
         cmocka_unit_test(test_fold_believes_no_odd_pe),
         cmocka_unit_test(test_fold_init_refuses_what_does_not_fit),
         cmocka_unit_test(test_fold_deal_shares_the_work),
