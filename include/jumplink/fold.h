@@ -34,7 +34,8 @@
  *     down  8 + 4 + o ((r+N+p - b)(r+N - b) + 2 max(r - b, 0) + N
  *                      + (r+n+p1+q - b1)(r+n - b1) + 2 max(r - b1, 0) + n)
  *     up    8 + o (N + n)
- * Without a measurement r = 0 and b less by r.  For (n,m,r) = (8,4,4), p1 = 8,
+ * Without a measurement r = 0 and b less by r; JL_MEKF_FILT: 8 more down and 8
+ * more up.  For (n,m,r) = (8,4,4), p1 = 8,
  * p2 = 4, o = 8, rows 0 4 6 9 16:
  *     link      up    down   up    all three
  *     0 - 1    1672   3500   168   5340
