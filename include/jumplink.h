@@ -34,6 +34,7 @@
 #include "jumplink/imm.h"
 #include "jumplink/cgimm.h"
 #include "jumplink/mekf.h"
+#include "jumplink/systolic.h"
 #include "jumplink/chan.h"
 #include "jumplink/wire.h"
 #include "jumplink/link.h"

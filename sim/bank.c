@@ -84,15 +84,22 @@ static int open_cg(struct bank *bank)
                          model->Pi, bank->mem, cap) == JL_OK ? 0 : -1;
 }
 
+static int open_mekf(struct bank *bank)
+{
+    bank->mekf = malloc(sizeof *bank->mekf);
+    return bank->mekf != NULL ? 0 : -1;
+}
+
 int bank_open(struct bank *bank, const struct model *model,
               const struct options *options)
 {
     memset(bank, 0, sizeof *bank);
     bank->model = model;
     bank->dt = -1;
-    if (model->M < 1)
+    if (model->M < 1 && model->mekf == NULL)
         return -1;
-    if (model->gains != NULL ? open_cg(bank) != 0
+    if (model->mekf != NULL ? open_mekf(bank) != 0
+        : model->gains != NULL ? open_cg(bank) != 0
         : copy_modes(bank) != 0 || open_imm(bank, options) != 0) {
         bank_close(bank);
         return -1;
@@ -105,6 +112,7 @@ void bank_close(struct bank *bank)
     free(bank->modes);
     free(bank->mode_mem);
     free(bank->mem);
+    free(bank->mekf);
     free(bank->scratch);
     free(bank->Pi);
     free(bank->x);
@@ -248,8 +256,28 @@ static int step_cg(struct bank *bank, jl_estimate *estimate,
     return status;
 }
 
+/* A row is a step, whatever its length. */
+static int step_mekf(struct bank *bank, jl_estimate *estimate,
+                     const jl_meas *meas)
+{
+    int status = meas->first
+        ? mekf_filter_start(bank->mekf, bank->model->mekf) : JL_OK;
+
+    if (status == JL_OK)
+        status = mekf_filter_step(bank->mekf, meas->z);
+    if (status != JL_OK)
+        return status;
+    estimate->verdict = meas->z != NULL ? JL_ACCEPTED : JL_MISSING;
+    estimate->loglik = 0;
+    estimate->x = mekf_filter_row(bank->mekf);
+    estimate->P = estimate->mu = NULL;
+    return JL_OK;
+}
+
 int bank_step(struct bank *bank, jl_estimate *estimate, const jl_meas *meas)
 {
+    if (bank->model->mekf != NULL)
+        return step_mekf(bank, estimate, meas);
     return (bank->model->gains != NULL ? step_cg : step_imm)(bank, estimate,
                                                              meas);
 }

@@ -3,6 +3,7 @@
 #define SIM_BANK_H
 
 #include "jumplink/par.h"
+#include "mekf_filter.h"
 #include "model_file.h"
 #include "options.h"
 
@@ -10,8 +11,9 @@ struct bank {
     const struct model *model;
     jl_real *mem, *scratch;
     jl_real *x, *P;             /* a start from a first measurement         */
-    jl_cgimm cg;                /* the filter of kind cgimm; else imm, and: */
-    jl_imm imm;
+    jl_cgimm cg;                /* the filter of kind cgimm                 */
+    struct mekf_filter *mekf;   /* of kind mekf; NULL of others             */
+    jl_imm imm;                 /* of kind imm, and:                        */
     jl_mode *modes;             /* own copies: they are rebuilt for each dt */
     jl_real *mode_mem, *Pi;
     jl_real dt;                 /* what modes and chain are built for       */

@@ -10,7 +10,8 @@ static const char help[] =
     "usage: jumplink filter MODEL.json DATA.csv [OPTIONS]\n"
     "Runs a filter over the measurements in a file and writes its\n"
     "estimates as CSV: time, x0.., P00,P01.. (upper triangle; not of kind\n"
-    "cgimm), mu0.., loglik.\n\n"
+    "cgimm), mu0.., loglik; of kind mekf time, xbar1.., ybar1.., xhat1..,\n"
+    "P11,P22.., P1_11,P1_22.. (of its ekf x1.., y1.., P11,P22..).\n\n"
     MODEL_HELP
     "  -o, --out FILE    where to (default: standard output)\n"
     "  --diagnostics     more columns: of each mode j its innovation\n"
@@ -20,6 +21,8 @@ static const char help[] =
     "  --truth A,-,B,..  ... and nees = e' P^-1 e, for data whose columns A,\n"
     "                    B,.. are the true state, in its order; -: unknown\n"
     COMMON_HELP
+    "  --spread          of kind mekf: filter B's predicted covariance also\n"
+    "                    has what not knowing the parameters does to x\n"
     DATA_HELP
     "  --pes P           run on this many PEs (default 4 with --port, else\n"
     "                    serial)\n"
@@ -47,6 +50,7 @@ int cmd_filter(int argc, char **argv)
 {
     static const struct option known[] = {
         { "diagnostics", no_argument, NULL, 2001 },
+        { "spread", no_argument, NULL, 2002 },
         { "truth", required_argument, NULL, 't' },
         COMMON_OPTIONS, { 0 }
     };
@@ -61,6 +65,8 @@ int cmd_filter(int argc, char **argv)
         }
         if (c == 2001)
             options.diagnostics = 1;
+        else if (c == 2002)
+            options.spread = 1;
         else if (c == 't')
             options.truth = optarg;
         else

@@ -10,6 +10,7 @@
 #include "manoeuvre.h"
 #include "out_file.h"
 #include "progress.h"
+#include "rivals.h"
 #include "run.h"
 #include "sim_live.h"
 
@@ -18,7 +19,7 @@
 static const char help[] =
     "usage: jumplink sim [OPTIONS]\n"
     "       jumplink sim --input lcm --model FILE --lcm-url URL [OPTIONS]\n"
-    "       jumplink sim --scenario manoeuvre1d [--runs N] [--seed S] [-o DIR]\n"
+    "       jumplink sim --scenario NAME [--runs N] [--seed S] [-o DIR]\n"
     "Filters a recorded flight on PEs that are processes talking over\n"
     "LCM, once with every position taken as fresh and once with held\n"
     "positions recognised, for each model; compares with the serial\n"
@@ -50,8 +51,11 @@ static const char help[] =
     "  --scenario manoeuvre1d  no flight, but simulated runs of a target that\n"
     "                    accelerates at 10 s and stops doing so at 25 s: IMM,\n"
     "                    constant-gain IMM and an adaptive alpha-beta filter\n"
-    "  --runs N          ... so many (default 2000)\n"
-    "  --seed S          ... with noise that S determines (default 1)\n"
+    "  --scenario ar1|spring2|turn  ... of a system with a parameter that is\n"
+    "                    not known: EKF, and MEKF without and with spread; a\n"
+    "                    verdict as measured (mostly the EKF is better)\n"
+    "  --runs N          so many (default 2000; of ar1, spring2, turn 100)\n"
+    "  --seed S          with noise that S determines (default 1)\n"
     HELP_HELP;
 
 /* One model, one way with held positions: serial for comparison, then
@@ -218,21 +222,49 @@ static int recorded(const char *data, const char *const *models, int count,
     return sim(data, models, count == 0 ? 2 : count, options);
 }
 
-/* Simulated runs; `other` is an option they have no use for, or NULL. */
-static int simulated(const char *scenario, const char *other, long runs,
-                     uint64_t seed, const char *folder)
+static int manoeuvres(long runs, uint64_t seed, const char *folder)
 {
     struct manoeuvre m;
 
-    if (strcmp(scenario, "manoeuvre1d") != 0)
-        return misuse("sim", "--scenario %s: only manoeuvre1d is known",
-                      scenario);
+    if (out_folder(folder) != 0
+        || manoeuvre_run(&m, runs > 0 ? runs : 2000, seed) != 0)
+        return 1;
+    return manoeuvre_report(&m, folder);
+}
+
+/* Each run is kept. */
+static int rivalry(const struct rivals_scenario *scenario, long runs,
+                   uint64_t seed, const char *folder)
+{
+    struct rivals r;
+    int status;
+
+    if (runs > 100000)
+        return misuse("sim", "--runs %ld: of --scenario %s at most 100000",
+                      runs, scenario->name);
+    if (out_folder(folder) != 0
+        || rivals_simulate(&r, scenario, runs > 0 ? runs : 100, seed) != 0)
+        return 1;
+    status = rivals_report(&r, folder);
+    rivals_free(&r);
+    return status;
+}
+
+/* Simulated runs (0: as many as usual); `other` is an option they have no use
+ * for, or NULL. */
+static int simulated(const char *scenario, const char *other, long runs,
+                     uint64_t seed, const char *folder)
+{
+    const struct rivals_scenario *rivals = rivals_scenario(scenario);
+
+    if (rivals == NULL && strcmp(scenario, "manoeuvre1d") != 0)
+        return misuse("sim", "--scenario %s: known are manoeuvre1d, ar1, "
+                      "spring2 and turn", scenario);
     if (other != NULL)
         return misuse("sim", "%s is not for --scenario, which takes --runs, "
                       "--seed and --out", other);
-    if (out_folder(folder) != 0 || manoeuvre_run(&m, runs, seed) != 0)
-        return 1;
-    return manoeuvre_report(&m, folder);
+    return rivals != NULL ? rivalry(rivals, runs, seed, folder)
+                          : manoeuvres(runs, seed, folder);
 }
 
 int cmd_sim(int argc, char **argv)
@@ -297,7 +329,7 @@ int cmd_sim(int argc, char **argv)
     if (optind < argc)
         return misuse("sim", "unexpected '%s'", argv[optind]);
     if (scenario != NULL)
-        return simulated(scenario, other, runs > 0 ? runs : 2000,
+        return simulated(scenario, other, runs,
                          seed >= 0 ? (uint64_t)seed : 1, options.out);
     if (runs > 0 || seed >= 0)
         return misuse("sim", "--runs and --seed go with --scenario");

@@ -8,5 +8,6 @@ int cmd_sim(int argc, char **argv);
 int cmd_filter(int argc, char **argv);
 int cmd_host(int argc, char **argv);
 int cmd_pe(int argc, char **argv);
+int cmd_systolic(int argc, char **argv);
 
 #endif

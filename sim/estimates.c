@@ -30,7 +30,7 @@ static int make_room(struct estimates *e, long rows)
 
     if (stretch(&e->x, had * n, rows * n) != 0
         || (e->has_P && stretch(&e->P, had * n * n, rows * n * n) != 0)
-        || stretch(&e->mu, had * M, rows * M) != 0
+        || (M > 0 && stretch(&e->mu, had * M, rows * M) != 0)
         || stretch(&e->loglik, had, rows) != 0)
         return -1;
     us = reallocarray(e->us, (size_t)rows, sizeof *us);
@@ -56,9 +56,10 @@ int estimates_open(struct estimates *e, const struct data_file *data,
                    const struct model *model)
 {
     memset(e, 0, sizeof *e);
-    e->n = model->n;
+    e->mekf = model->mekf;
+    e->n = model->mekf != NULL ? mekf_filter_columns(model->mekf) : model->n;
     e->M = model->M;
-    e->has_P = model->gains == NULL;
+    e->has_P = model->gains == NULL && model->mekf == NULL;
     if (estimates_grow(e, data->rows) == 0)
         return 0;
     estimates_close(e);
@@ -83,7 +84,8 @@ void estimates_note(struct estimates *e, long row, const jl_estimate *estimate,
     memcpy(e->x + at * n, estimate->x, n * sizeof *e->x);
     if (e->has_P)
         memcpy(e->P + at * n * n, estimate->P, n * n * sizeof *e->P);
-    memcpy(e->mu + at * M, estimate->mu, M * sizeof *e->mu);
+    if (e->M > 0)
+        memcpy(e->mu + at * M, estimate->mu, M * sizeof *e->mu);
     e->loglik[row] = estimate->loglik;
     e->us[row] = us;
     e->done = row + 1;
@@ -164,13 +166,14 @@ static void put(FILE *out, jl_real v)
         fprintf(out, ",%.17g", (double)v);
 }
 
-void estimates_write(const struct estimates *e, const struct data_file *data,
-                     int partial, FILE *out)
+static void put_names(const struct estimates *e, FILE *out)
 {
     int n = e->n, a, b;
-    long row, rows = partial ? e->done : e->rows;
 
-    fprintf(out, "%s%s", data->run != NULL ? "run," : "", data->time_name);
+    if (e->mekf != NULL) {
+        mekf_filter_names(e->mekf, out);
+        return;
+    }
     for (a = 0; a < n; a++)
         fprintf(out, ",x%d", a);
     for (a = 0; a < n && e->has_P; a++)
@@ -181,21 +184,38 @@ void estimates_write(const struct estimates *e, const struct data_file *data,
     fputs(",loglik", out);
     if (e->diagnostics != NULL)
         diagnostics_write_names(e->diagnostics, out);
+}
+
+static void put_row(const struct estimates *e, long row, FILE *out)
+{
+    int n = e->n, a, b;
+
+    for (a = 0; a < n; a++)
+        put(out, e->x[row * n + a]);
+    for (a = 0; a < n && e->has_P; a++)
+        for (b = a; b < n; b++)
+            put(out, e->P[(row * n + a) * n + b]);
+    for (a = 0; a < e->M; a++)
+        put(out, e->mu[row * e->M + a]);
+    if (e->mekf == NULL)
+        put(out, e->loglik[row]);
+    if (e->diagnostics != NULL)
+        diagnostics_write(e->diagnostics, row, out);
+}
+
+void estimates_write(const struct estimates *e, const struct data_file *data,
+                     int partial, FILE *out)
+{
+    long row, rows = partial ? e->done : e->rows;
+
+    fprintf(out, "%s%s", data->run != NULL ? "run," : "", data->time_name);
+    put_names(e, out);
     fputc('\n', out);
     for (row = 0; row < rows; row++) {
         if (data->run != NULL)
             fprintf(out, "%ld,", data->run[row]);
         fputs(data->time_text[row], out);
-        for (a = 0; a < n; a++)
-            put(out, e->x[row * n + a]);
-        for (a = 0; a < n && e->has_P; a++)
-            for (b = a; b < n; b++)
-                put(out, e->P[(row * n + a) * n + b]);
-        for (a = 0; a < e->M; a++)
-            put(out, e->mu[row * e->M + a]);
-        put(out, e->loglik[row]);
-        if (e->diagnostics != NULL)
-            diagnostics_write(e->diagnostics, row, out);
+        put_row(e, row, out);
         fputc('\n', out);
     }
     if (partial)

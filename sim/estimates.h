@@ -6,6 +6,7 @@
 
 #include "data_file.h"
 #include "jumplink/par.h"
+#include "mekf_filter.h"
 #include "model_file.h"
 
 struct diagnostics;
@@ -15,10 +16,12 @@ struct estimates {
     long done;                  /* behind the last with an estimate         */
     long judged, rejected;      /* measurements, and those the gate rejected */
     int n, M;
+    const struct mekf_setup *mekf;      /* of kind mekf: its n columns, and
+                                           no mu, no loglik; or NULL        */
     jl_real *x;                 /* [rows,n]; NaN in rows without estimate   */
-    int has_P;                  /* 0 of kind cgimm                          */
+    int has_P;                  /* 0 of kinds cgimm and mekf                */
     jl_real *P;                 /* [rows,n,n] or NULL                       */
-    jl_real *mu;                /* [rows,M]                                 */
+    jl_real *mu;                /* [rows,M]; NULL of kind mekf, whose M is 0 */
     jl_real *loglik;            /* [rows]                                   */
     struct diagnostics *diagnostics;    /* more columns; or NULL            */
     double *us;                 /* [rows] wall clock of the step; NaN in a
@@ -49,7 +52,7 @@ long estimates_times(const struct estimates *e, double *median_us,
                      double *p99_us);
 
 /* As CSV: time (and run), x, P upper triangle, mu, loglik, and diagnostics, P
- * and these if they are there; all rows, or, when `partial`, those that were
+ * and these if they are there, or the columns of kind mekf; all rows, or, when `partial`, those that were
  * done and a last line that says so. */
 void estimates_write(const struct estimates *e, const struct data_file *data,
                      int partial, FILE *out);

@@ -10,7 +10,7 @@ int feed_open(struct feed *feed, const struct data_file *data,
 {
     memset(feed, 0, sizeof *feed);
     feed->data = data;
-    feed->needs_first = model->x0 == NULL;
+    feed->needs_first = model->x0 == NULL && model->mekf == NULL;
     feed->hold = options->hold;
     if (feed->hold == HOLD_DEFAULT)
         feed->hold = data->arrived != NULL ? HOLD_COLUMN : HOLD_NONE;

@@ -289,6 +289,24 @@ int json_take_list(int *count, const struct json_at *at, const char *key,
     return 0;
 }
 
+static int check_object(const struct json_at *at)
+{
+    return json_is_object(at->object) ? 0
+        : json_wrong(at, NULL, "must be an object, is %s",
+                     type_name(at->object));
+}
+
+int json_member(struct json_at *member, const struct json_at *top,
+                const char *key)
+{
+    if (needed(top, key) == NULL)
+        return -1;
+    member->file = top->file;
+    member->object = json_object_get(top->object, key);
+    snprintf(member->key, sizeof member->key, "%.40s", key);
+    return check_object(member);
+}
+
 int json_entry(struct json_at *entry, const struct json_at *top,
                const char *key, int i)
 {
@@ -297,8 +315,5 @@ int json_entry(struct json_at *entry, const struct json_at *top,
     entry->file = top->file;
     entry->object = json_array_get(array, (size_t)i);
     snprintf(entry->key, sizeof entry->key, "%.40s[%d]", key, i);
-    if (!json_is_object(entry->object))
-        return json_wrong(entry, NULL, "must be an object, is %s",
-                          type_name(entry->object));
-    return 0;
+    return check_object(entry);
 }

@@ -56,6 +56,10 @@ int json_take_matrix(jl_real *A, const struct json_at *at, const char *key,
 int json_take_list(int *count, const struct json_at *at, const char *key,
                    int low, int high);
 
+/* The object of a key at the top of the file. */
+int json_member(struct json_at *member, const struct json_at *top,
+                const char *key);
+
 /* Entry i of such an array at the top of the file. */
 int json_entry(struct json_at *entry, const struct json_at *top,
                const char *key, int i);

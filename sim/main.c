@@ -19,6 +19,8 @@ static const struct {
       cmd_filter },
     { "host", "the host of a run whose PEs were started by hand", cmd_host },
     { "pe", "one PE of a run, started by hand", cmd_pe },
+    { "systolic", "the MEKF on an array of cells: counts, picture",
+      cmd_systolic },
 };
 
 #define COMMANDS (sizeof commands / sizeof *commands)

@@ -23,18 +23,6 @@ static int has(int filter, int state)
     return filter != MAN_ADAPTIVE || state != MAN_ACCELERATION;
 }
 
-static int open_in(struct out_file *out, const char *folder, const char *name)
-{
-    char *path;
-    int status;
-
-    if (asprintf(&path, "%s/%s", folder, name) < 0)
-        return -1;
-    status = out_open(out, path);
-    free(path);
-    return status;
-}
-
 /* --- table --------------------------------------------------------------- */
 
 static void print_filter(const struct manoeuvre *m, int f, int p, FILE *out)
@@ -254,7 +242,7 @@ static int write_file(const struct manoeuvre *m, const char *folder,
 {
     struct out_file out;
 
-    if (open_in(&out, folder, name) != 0)
+    if (out_open_in(&out, folder, name) != 0)
         return -1;
     put(m, out.stream);
     return out_close(&out, 1);

@@ -104,7 +104,7 @@ static int spring_dc(jl_real *J, const jl_real *x, const jl_real *y,
 
 /* --- ct4: a coordinated turn of unknown rate ------------------------------ */
 
-/* The turn by a = y T, and derivatives by a: S = sin a / a, C = (1 - cos a) / a.
+/* The turn by a = y T: S = sin a / a, C = (1 - cos a) / a, derivatives by a.
  * Differences of nearly the same are avoided by half angles, and where that
  * is no help, in the derivatives at small a, by series. */
 struct turn {

@@ -5,7 +5,11 @@
 
 #include "jumplink/mekf.h"
 
-enum { ZOO_R = 4 };                     /* spring2's most measurements */
+enum {                          /* the most of any model */
+    ZOO_STATES = 5,             /* n + m                                    */
+    ZOO_NOISES = 3,             /* p1 + p2                                  */
+    ZOO_R = 4                   /* of spring2, which may have fewer         */
+};
 
 /* The numbers of a model: each needs only those that it names below. */
 struct mekf_zoo {
@@ -17,7 +21,8 @@ struct mekf_zoo {
 
 /* A model by its name, with all its derivatives:
  *     ar1      n 1, m 1, r 1   f = y;  c = 1;  G1 = 1
- *     spring2  n 2, m 1, r 1-4 f = [1 T; -T y, 1 - T d];  c = C [r,2];  G1 = [0; 1]
+ *     spring2  n 2, m 1, r 1-4  f = [1 T; -T y, 1 - T d];  c = C [r,2];
+ *                              G1 = [0; 1]
  *     ct4pos   n 4, m 1, r 2   x = px vx py vy, turned by y T: coordinated
  *                              turn of the rate y;  c picks px, py;  G1 =
  *                              [T^2/2 0; T 0; 0 T^2/2; 0 T]

@@ -48,9 +48,8 @@ static int asymmetric(const jl_real *A, const struct json_at *at,
                       (double)A[column * n + row], jl_status_text(JL_EASYM));
 }
 
-/* A covariance A [n,n], positive semidefinite or definite. */
-static int take_cov(jl_real *A, const struct json_at *at, const char *key,
-                    int n, int definite)
+int model_take_cov(jl_real *A, const struct json_at *at, const char *key,
+                   int n, int definite)
 {
     jl_real *work;
     int status;
@@ -180,7 +179,7 @@ static int take_start(struct model *model, const struct json_at *at, int mode,
     if (x == NULL)
         return model_no_memory(at);
     error = json_take_vector(x, at, "x0", k, JL_LARGE) != 0
-        || take_cov(P, at, "P0", k, 0) != 0;
+        || model_take_cov(P, at, "P0", k, 0) != 0;
     for (i = 0; i < k && !error; i++) {
         int row = mode * n + (map != NULL ? map[i] : i);
 
@@ -294,10 +293,10 @@ static int take_matrices(jl_mode *mode, const struct json_at *at)
         return model_no_memory(at);
     error = json_take_matrix(F, at, "Phi", n, n, JL_LARGE)
         || json_take_matrix(G, at, "Gamma", n, p, JL_LARGE)
-        || take_cov(Q, at, "Q", p, 0)
+        || model_take_cov(Q, at, "Q", p, 0)
         || (own_mean && json_take_vector(w_bar, at, "w_bar", p, JL_LARGE))
         || json_take_matrix(H, at, "H", m, n, JL_LARGE)
-        || take_cov(R, at, "R", m, 1);
+        || model_take_cov(R, at, "R", m, 1);
     if (!error)
         status = jl_mode_set(mode, F, G, Q, w_bar, H, R, scratch);
     if (status != JL_OK)
@@ -536,37 +535,39 @@ static int read_catalogue(struct model *model, const struct json_at *top)
 
 /* --- the file ---------------------------------------------------------- */
 
-/* 1 if the kind is cgimm, 0 if it is imm, -1 after a message. */
-static int take_kind(const struct json_at *top)
+/* What the file says, if it is one of those known. */
+static int take_kind(const char **kind, const struct json_at *top)
 {
-    static const char *const others[] = {
-        "mekf", "particle", "dropout"
-    };
-    const char *kind;
+    static const char *const known[] = { "imm", "cgimm", "mekf" };
+    static const char *const others[] = { "particle", "dropout" };
     size_t i;
 
-    if (json_take_text(&kind, top, "kind") != 0)
+    if (json_take_text(kind, top, "kind") != 0)
         return -1;
+    for (i = 0; i < sizeof known / sizeof known[0]; i++)
+        if (strcmp(*kind, known[i]) == 0)
+            return 0;
     for (i = 0; i < sizeof others / sizeof others[0]; i++)
-        if (strcmp(kind, others[i]) == 0)
+        if (strcmp(*kind, others[i]) == 0)
             return json_wrong(top, "kind",
-                              "'%s' is not supported by this version", kind);
-    if (strcmp(kind, "cgimm") == 0)
-        return 1;
-    return strcmp(kind, "imm") == 0 ? 0
-        : json_wrong(top, "kind", "'%.40s' is unknown", kind);
+                              "'%s' is not supported by this version", *kind);
+    return json_wrong(top, "kind", "'%.40s' is unknown", *kind);
 }
 
 static int read_model(struct model *model, const struct json_at *top)
 {
     struct json_at first;
-    int cgimm = take_kind(top), catalogue;
+    const char *kind;
+    int catalogue;
 
-    if (cgimm < 0
-        || json_take_list(&model->M, top, "modes", 1, JL_MAX_MODES) != 0
+    if (take_kind(&kind, top) != 0)
+        return -1;
+    if (strcmp(kind, "mekf") == 0)
+        return model_read_mekf(model, top);
+    if (json_take_list(&model->M, top, "modes", 1, JL_MAX_MODES) != 0
         || json_entry(&first, top, "modes", 0) != 0)
         return -1;
-    if (cgimm)
+    if (strcmp(kind, "cgimm") == 0)
         return model_read_cgimm(model, top) != 0 ? -1
             : model_take_mu0(model, top, 1);
     catalogue = json_has(top, "axes") || json_has(&first, "type");
@@ -604,6 +605,7 @@ void model_free(struct model *model)
     free(model->modes);
     free(model->motions);
     free(model->gains);
+    free(model->mekf);
     free(model->map);
     free(model->prior_x);
     free(model->sojourn_s);

@@ -22,6 +22,13 @@ int model_take_mu0(struct model *model, const struct json_at *top, int needed);
 /* Pi [M,M]. */
 int model_take_Pi(struct model *model, const struct json_at *top);
 
+/* A covariance A [n,n], positive semidefinite or definite. */
+int model_take_cov(jl_real *A, const struct json_at *at, const char *key,
+                   int n, int definite);
+
+/* All of a model of kind mekf. */
+int model_read_mekf(struct model *model, const struct json_at *top);
+
 /* All of a model of kind cgimm but mode count and mu0. */
 int model_read_cgimm(struct model *model, const struct json_at *top);
 

@@ -146,7 +146,9 @@ const char *options_form(const struct options *o)
 int options_take(struct options *o, int c, char *const *argv)
 {
     const char *value = optarg;
-    static const char *const filters[] = { "imm", "cgimm", "kf", NULL };
+    static const char *const filters[] = {
+        "imm", "cgimm", "kf", "mekf", "ekf", NULL
+    };
     static const char *const holds[] = { "none", "detect", "column", NULL };
     static const char *const exchanges[] = { "gather", "reduce", NULL };
     long number = 0;

@@ -16,7 +16,10 @@ enum hold {                     /* which rows count as arrived */
 /* BY_HAND: over LCM, with PEs that somebody else starts. */
 enum port { PORT_NONE, PORT_LOOP, PORT_THREADS, PORT_LCM, PORT_BY_HAND };
 
-enum filter { FILTER_OF_KIND, FILTER_IMM, FILTER_CGIMM, FILTER_KF };
+enum filter {
+    FILTER_OF_KIND, FILTER_IMM, FILTER_CGIMM, FILTER_KF, FILTER_MEKF,
+    FILTER_EKF
+};
 
 struct live_input;
 
@@ -24,6 +27,7 @@ struct options {
     const char *command;        /* for messages: "filter"                   */
     enum filter filter;         /* OF_KIND: the one the model is of         */
     int mode;                   /* of FILTER_KF; -1: the only one           */
+    int spread;                 /* of FILTER_MEKF (jumplink/mekf.h)         */
     const jl_kf_form *form;
     int form_given;
     double gate;                /* a good measurement passes with this
@@ -70,8 +74,9 @@ struct options {
     { "help", no_argument, NULL, 'h' }
 
 #define COMMON_HELP \
-    "  --filter imm|cgimm|kf  all modes, by the model's kind (default), or\n" \
-    "                    the Kalman filter of one mode of kind imm\n" \
+    "  --filter imm|cgimm|kf|mekf|ekf  by the model's kind (default), or the\n" \
+    "                    Kalman filter of one mode of kind imm, or the plain\n" \
+    "                    extended one of kind mekf\n" \
     "  --mode J          ... of this one, from 0 (default: the only one)\n" \
     "  --form joseph|standard|sqrt  how covariances are kept and updated\n" \
     "                    (default joseph; sqrt: as factors)\n" \
@@ -94,7 +99,10 @@ struct options {
     "top; modes with gains w0, winf, kc, or with an order and a Q for each\n" \
     "at the top, which make the gains; x0 in all of them, or in none: then\n" \
     "it is the first measurement, at rest.  A row is a step of T.  Without\n" \
-    "covariances: no --form, --gate, --diagnostics, --exchange reduce.\n\n"
+    "covariances: no --form, --gate, --diagnostics, --exchange reduce.\n" \
+    "Or kind mekf: model ar1, spring2, ct4pos, ct4rdc or gen32, with its\n" \
+    "params; n, m, r, p1, p2; x0, y0, P0, P10, Q, R; cb prev, pred or filt\n" \
+    "(jumplink/mekf.h, sim/mekf_zoo.h).  A row is a step; on one processor.\n\n"
 #define DATA_HELP \
     "  --hold HOW        which measurements count as lost: none; detect:\n" \
     "                    those that repeat the row before exactly; column:\n" \

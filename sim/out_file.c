@@ -95,6 +95,18 @@ int out_open(struct out_file *out, const char *path)
     return 0;
 }
 
+int out_open_in(struct out_file *out, const char *folder, const char *name)
+{
+    char *path;
+    int status;
+
+    if (asprintf(&path, "%s/%s", folder, name) < 0)
+        return complain(folder, 0, NULL, "out of memory");
+    status = out_open(out, path);
+    free(path);
+    return status;
+}
+
 int out_close(struct out_file *out, int keep)
 {
     int closed;

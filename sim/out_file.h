@@ -15,6 +15,9 @@ struct out_file {
  * Returns 0, or -1 with one line on standard error. */
 int out_open(struct out_file *out, const char *path);
 
+/* The same, in a folder. */
+int out_open_in(struct out_file *out, const char *folder, const char *name);
+
 /* Finish: keep != 0 flushes, checks for write errors and renames; keep == 0
  * removes the temporary file.  Returns 0, or -1 with one line on standard
  * error (then nothing is left at path that was not there before). */

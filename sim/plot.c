@@ -107,6 +107,10 @@ static void put_style(FILE *gp, enum plot_style style, int *lines)
         fprintf(gp, " with lines linewidth 1.6 linecolor '%s'",
                 colours[(*lines)++ % COLOURS]);
         break;
+    case PLOT_DASHES:
+        fprintf(gp, " with lines linewidth 1.6 dashtype (16,16) "
+                "linecolor '%s'", colours[(*lines)++ % COLOURS]);
+        break;
     case PLOT_TRUTH:
         fprintf(gp, " with lines linewidth 1.4 dashtype 2 "
                 "linecolor '#202020'");
@@ -310,8 +314,13 @@ int plot_errors(const char *folder, const char *name, const char *title,
     fprintf(out.stream,
             "set logscale y\n"
             "set format y '%%g'\n"
+            "set ytics ()\n"
+            "do for [e = -9:9] {\n"
+            "    set ytics add (10.0 ** e, 2 * 10.0 ** e, 5 * 10.0 ** e)\n"
+            "}\n"
             "set y2range [0:1]\n"
-            "set autoscale xfix\n");
+            "set autoscale xfix\n"
+            "set autoscale yfix\n");
     put_series(out.stream, series, count, "");
     return finish(&out, folder, name);
 }
@@ -366,5 +375,41 @@ int plot_modes(const char *folder, const char *name, const char *title,
             "set label 1 'a full lane: probability 1' at graph 1, -0.075 right "
             "textcolor '#707070'\n");
     put_lanes(out.stream, file, time, mode, M);
+    return finish(&out, folder, name);
+}
+
+int plot_cells(const char *folder, const char *name, const char *title,
+               const char *file, const char *const *mode, int M, int cells,
+               int left)
+{
+    struct out_file out;
+    int j;
+
+    if (begin(&out, folder, name) != 0)
+        return -1;
+    put_head(out.stream, name, title, "tick", "cell, row by row");
+    fprintf(out.stream,
+            "set autoscale xfix\n"
+            "set yrange [%d.5:-0.5]\n"
+            "set style fill solid noborder\n"
+            "unset grid\n"
+            "set arrow 1 from graph 0, first %d.5 to graph 1, first %d.5 "
+            "nohead linecolor '#404040'\n"
+            "set label 1 'left triangle' at graph 1.02, first %d center "
+            "rotate textcolor '#707070'\n"
+            "set label 2 'right triangle, diamonds' at graph 1.02, first %d "
+            "center rotate textcolor '#707070'\n"
+            "plot", cells - 1, left - 1, left - 1, left / 2,
+            (left + cells) / 2);
+    for (j = 0; j < M; j++) {
+        fprintf(out.stream, "%s\\\n    ", j > 0 ? ", " : " ");
+        put_text(out.stream, file);
+        fprintf(out.stream, " using (column('tick')):"
+                "(strcol('mode') eq '%s' ? column('cell') : NaN):(0.45):(0.45)",
+                mode[j]);
+        put_title(out.stream, mode[j]);
+        fprintf(out.stream, " with boxxyerror linecolor '%s'",
+                colours[j % COLOURS]);
+    }
     return finish(&out, folder, name);
 }

@@ -6,6 +6,7 @@
 enum plot_style {
     PLOT_DOTS,                  /* measurements                             */
     PLOT_LINE,                  /* estimates                                */
+    PLOT_DASHES,                /* the same, for one that may hide another  */
     PLOT_TRUTH,                 /* what really was: thin and dashed         */
     PLOT_SHADE                  /* grey while y is not 0: lost measurements */
 };
@@ -42,5 +43,11 @@ int plot_curves(const char *folder, const char *name, const char *title,
 int plot_errors(const char *folder, const char *name, const char *title,
                 const char *y_label, const struct plot_series *series,
                 int count);
+
+/* What each of `cells` cells did in each tick: columns tick, cell, mode of a
+ * file; mode [M] are the names of the modes.  A line below the first `left`. */
+int plot_cells(const char *folder, const char *name, const char *title,
+               const char *file, const char *const *mode, int M, int cells,
+               int left);
 
 #endif

@@ -39,10 +39,43 @@ static int check_cgimm(const struct model *model, const struct options *o)
     return 0;
 }
 
+/* What the filters of kind mekf, on one processor, cannot do. */
+static int pick_mekf(struct model *model, const struct options *o)
+{
+    const char *option = o->filter == FILTER_IMM ? "--filter imm"
+        : o->filter == FILTER_CGIMM ? "--filter cgimm"
+        : o->filter == FILTER_KF ? "--filter kf"
+        : o->form_given ? "--form"
+        : o->gate > 0 ? "--gate"
+        : o->diagnostics ? "--diagnostics"
+        : o->mode >= 0 ? "--mode" : NULL;
+
+    if (option != NULL)
+        return misuse(o->command, "%s is not for kind mekf, and %s is of it",
+                      option, model->path);
+    if (o->port != PORT_NONE)
+        return misuse(o->command, "%s is of kind mekf, which runs on one "
+                      "processor: jumplink filter without --pes and --port",
+                      model->path);
+    if (o->spread && o->filter == FILTER_EKF)
+        return misuse(o->command, "--spread is not for --filter ekf");
+    model->mekf->plain = o->filter == FILTER_EKF;
+    model->mekf->spread = o->spread;
+    return 0;
+}
+
 int run_pick_mode(struct model *model, const struct options *options)
 {
     int j = options->mode, k;
 
+    if (model->mekf != NULL)
+        return pick_mekf(model, options);
+    if (options->filter == FILTER_MEKF || options->filter == FILTER_EKF
+        || options->spread)
+        return misuse(options->command, "%s needs a model of kind mekf, and "
+                      "%s is none", options->spread ? "--spread"
+                      : options->filter == FILTER_EKF ? "--filter ekf"
+                      : "--filter mekf", model->path);
     if (model->gains == NULL && options->filter == FILTER_CGIMM)
         return misuse(options->command, "--filter cgimm needs gains, and %s "
                       "is of kind imm", model->path);

@@ -14,7 +14,8 @@
  *              mu_t = c_t exp(l_t) / sum of them
  *     combine  xhat = sum_t mu_t x_t
  * S = R / (1 - alpha) is exact for the gains of a Kalman filter.  A c_t below
- * 2^-54 JL_REAL_MIN may count as 0: a mode that is entered from no other may
+ * 1024 JL_REAL_MIN may count as 0, and so may a likelihood whose ratio to the
+ * best one is less than JL_REAL_MIN: a mode that is entered from no other may
  * be lost for good.
  *
  * Two modes of order 2 and 3 with steady gains, one axis: 24 multiplications
@@ -123,11 +124,12 @@ typedef struct jl_cgimm {
     jl_real *keep;              /* [M]   1 - alpha                          */
     jl_real *q;                 /* [M]   axes log(1 / 2 pi S) / 2           */
     jl_real q_more;             /* of two modes, q_0 - q_1                  */
-    jl_real *weight;            /* [M]   mu times a number of 2^54 to 2^64  */
+    jl_real *weight;            /* [M]   mu times their sum, 2^-10 to 2      */
     jl_real all, all_before, all_left;  /* sums of weights: after and before the
                                    last measurement, as kept for the next   */
     int best;                   /* likeliest mode there; -1: no measurement */
     jl_real best_sum;           /* its l                                    */
+    int diverged;               /* 1: a mode's l has overflowed             */
     jl_real *c;                 /* [M]   predicted weights                  */
     jl_real *l;                 /* [M]   the axes' sum of (1 - alpha) nu^2  */
     jl_real *moving;            /* [M]   0: gains are what they will be     */
@@ -142,10 +144,12 @@ typedef struct jl_cgimm {
  * cap >= JL_CGIMM_STATE(M, axes).  x = 0, mu uniform, gains at their start.
  * Pi [M,M], rows sum to 1.
  * Returns JL_OK, JL_EDIM (M outside 1..JL_MAX_MODES, axes outside
- * 1..JL_MAX_STATES, an order), JL_ENOMEM, JL_ENONFINITE, JL_EPROB (Pi), JL_ERANGE (T or R not above
- * 0; gains of no stable filter: alpha not in 0..1, beta not in 0..4 - 2 alpha,
- * gamma not in 0..4 alpha beta / (2 - alpha); k not in 0..1e6); *cg is
- * untouched on error. */
+ * 1..JL_MAX_STATES, an order), JL_ENOMEM, JL_ENONFINITE, JL_EPROB (Pi),
+ * JL_ERANGE (T or R not above 0; gains of no stable filter: alpha not in 0..1,
+ * beta not in 0..4 - 2 alpha, gamma not in 0..4 alpha beta / (2 - alpha); an
+ * alpha within 2 JL_EPSILON of 1, in the end or after the first measurement, as
+ * of a lambda above 3e3 in float; k not in 0..1e6); *cg is untouched on
+ * error. */
 int jl_cgimm_init(jl_cgimm *cg, int M, const jl_cg_gains *gains, int axes,
                   jl_real T, jl_real R, const jl_real *Pi, jl_real *mem,
                   int cap);
@@ -161,8 +165,15 @@ int jl_cgimm_set(jl_cgimm *cg, const jl_real *x, const jl_real *mu);
 void jl_cgimm_restart(jl_cgimm *cg, int j);
 
 /* One step with z [axes]; NULL: no measurement, all is predicted, gains wait.
- * Returns JL_OK, or JL_ENONFINITE (z not finite or beyond JL_LARGE): unchanged
- * then. */
+ *
+ * Gains are those of measurements T apart.  Where for long only every n-th comes
+ * a mode's errors die out only if n beta < 4 - 2 alpha and, with order 3,
+ * n gamma < 4 alpha beta / (2 - alpha): with the paper's modes up to n = 40
+ * (CV), but 3 (CA); beyond it they grow without end.
+ *
+ * Returns JL_OK, or JL_ENONFINITE: z not finite or beyond JL_LARGE; or, from
+ * then on until jl_cgimm_set, a mode has diverged, so far that nu^2 has
+ * overflowed.  Unchanged then, and still finite. */
 int jl_cgimm_step(jl_cgimm *cg, const jl_real *z);
 
 /* The stages of a step, for filters spread over several processors (par.h):
@@ -175,7 +186,7 @@ int jl_cgimm_step(jl_cgimm *cg, const jl_real *z);
  * is NULL.  foresee may be called at any time and starts the step anew, combine
  * right after weigh only: it has what the next mixing needs.
  * filter_mode and weigh return JL_OK, JL_EORDER (filter without foresee, weigh
- * without filter), filter_mode JL_ENONFINITE (z). */
+ * without filter), filter_mode JL_ENONFINITE as jl_cgimm_step. */
 void jl_cgimm_foresee(jl_cgimm *cg);
 void jl_cgimm_mix_mode(jl_cgimm *cg, int j);
 int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z);
@@ -219,8 +230,8 @@ typedef struct jl_cg_adaptive {
 
 /* Gains low, high [2] (jl_cg_steady), smoothing c in (0, 1], 0 <= down <= up;
  * mem [cap], cap >= JL_CG_ADAPTIVE_STATE(axes).  x = 0, level 1.
- * Returns JL_OK, JL_EDIM (axes outside 1..JL_MAX_STATES), JL_ENOMEM, JL_ERANGE (gains
- * of no stable filter, or another argument); *f is untouched on error. */
+ * Returns JL_OK, JL_EDIM (axes outside 1..JL_MAX_STATES), JL_ENOMEM, JL_ERANGE
+ * (gains of no stable filter, or another argument); *f is untouched on error. */
 int jl_cg_adaptive_init(jl_cg_adaptive *f, int axes, jl_real T, jl_real R,
                         const jl_real *low, const jl_real *high, jl_real c,
                         jl_real up, jl_real down, jl_real *mem, int cap);

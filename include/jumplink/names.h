@@ -104,6 +104,10 @@
 #define jl_ekf_set jl_ekf_set_f32
 #define jl_ekf_step jl_ekf_step_f32
 
+#define jl_systolic_init jl_systolic_init_f32
+#define jl_systolic_step jl_systolic_step_f32
+#define jl_systolic_cov jl_systolic_cov_f32
+
 #define jl_put_real jl_put_real_f32
 #define jl_get_real jl_get_real_f32
 #define jl_put_reals jl_put_reals_f32

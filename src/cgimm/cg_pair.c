@@ -89,12 +89,13 @@ void jli_pair_mix(jl_cgimm *cg, int j)
 
 /* By how much mode 0 is likelier.  Sums beyond all numbers are cut, but where
  * nothing waits for it. */
-JL_INLINE jl_real likelier(const jl_cgimm *cg, struct two sum)
+JL_INLINE jl_real likelier(jl_cgimm *cg, struct two sum)
 {
     const jl_real more = cg->q_more + cg->h * (sum.of_0 - sum.of_1);
 
     if (more >= -JL_REAL_MAX && more <= JL_REAL_MAX)
         return more;
+    cg->diverged = !(sum.of_0 <= JL_REAL_MAX && sum.of_1 <= JL_REAL_MAX);
     return jli_cg_loglik(cg, sum.of_0) - jli_cg_loglik(cg, sum.of_1);
 }
 

@@ -59,36 +59,29 @@ JL_INLINE jl_real jli_cg_loglik(const jl_cgimm *cg, jl_real sum)
     return -JL_REAL_MAX;
 }
 
-/* Weights have a sum of 2^54 to 2^64: a mode may then fall far below JL_REAL_MIN
- * and yet come back. */
-#define JLI_WEIGHTS JL_C(18446744073709551616.0)
-
-/* Weights that add up to `all` do so without a measurement. */
-JL_INLINE void jli_cg_unweighed(jl_cgimm *cg, jl_real all)
-{
-    cg->best = -1;
-    cg->all = cg->all_before = cg->all_left = all;
-}
-
-/* End a weighing: the new weights add up to `all`, to be multiplied by mode
- * `best`'s likelihood, of the sum `sum`.  They are not divided by it, so that
- * the next step need not wait for a division, and multiplied only by powers
- * of 2. */
-JL_INLINE void jli_cg_weighed(jl_cgimm *cg, jl_real all, int best,
-                              jl_real sum)
+/* Weights become mu, their sum 1. */
+JL_INLINE void jli_cg_weights_are_mu(jl_cgimm *cg)
 {
     int j;
 
+    for (j = 0; j < cg->M; j++)
+        cg->weight[j] = cg->mu[j];
+    cg->all_left = 1;
+}
+
+/* End a weighing: the new weights add up to `all`, to be multiplied by mode
+ * `best`'s likelihood, of the sum `sum`.  The next step need not wait for the
+ * division that makes mu of them: only where the sum has gone far from 1 they
+ * become mu. */
+JL_INLINE void jli_cg_weighed(jl_cgimm *cg, jl_real all, int best,
+                              jl_real sum)
+{
     cg->best = best;
     cg->best_sum = sum;
     cg->all_before = cg->all_left;
-    cg->all = all;
-    while (all < JLI_WEIGHTS / 1024) {
-        all *= 1024;
-        for (j = 0; j < cg->M; j++)
-            cg->weight[j] *= 1024;
-    }
-    cg->all_left = all;
+    cg->all = cg->all_left = all;
+    if (!(all >= JL_C(0.0009765625) && all <= 2))
+        jli_cg_weights_are_mu(cg);
 }
 
 #endif

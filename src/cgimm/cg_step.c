@@ -147,7 +147,8 @@ static void filter(jl_cgimm *cg, int j, const jl_real *z)
 
 static int is_usable(const jl_cgimm *cg, const jl_real *z)
 {
-    return z == NULL || jl_vec_within(z, cg->axes, JL_LARGE);
+    return !cg->diverged
+        && (z == NULL || jl_vec_within(z, cg->axes, JL_LARGE));
 }
 
 int jl_cgimm_filter_mode(jl_cgimm *cg, int j, const jl_real *z)
@@ -170,6 +171,7 @@ static void weigh_all(jl_cgimm *cg)
 
     for (j = 0; j < M; j++) {
         cg->e[j] = cg->q[j] + jli_cg_loglik(cg, cg->l[j]);
+        cg->diverged |= !(cg->l[j] <= JL_REAL_MAX);
         if (cg->c[j] > 0 && (best < 0 || cg->e[j] > cg->e[best]))
             best = j;
     }
@@ -206,8 +208,9 @@ static void keep_weights(jl_cgimm *cg)
     for (j = 0; j < cg->M; j++)
         all += cg->c[j];
     for (j = 0; j < cg->M; j++)
-        cg->mu[j] = (cg->weight[j] = cg->c[j]) / all;
-    jli_cg_unweighed(cg, all);
+        cg->mu[j] = cg->c[j] / all;
+    jli_cg_weights_are_mu(cg);
+    cg->best = -1;
 }
 
 int jl_cgimm_weigh(jl_cgimm *cg, const jl_real *z)

@@ -29,6 +29,11 @@ static void layout(jl_cgimm *cg, jl_real *mem)
     cg->Pi = cg->weight + M;
 }
 
+static jl_real rate_of(jl_real k)
+{
+    return k > 0 ? 1 - jl_exp(-1 / k) : 1;
+}
+
 static void set_goal(jl_cgimm *cg, int j)
 {
     const jl_cg_gains *g = &cg->gains[j];
@@ -36,7 +41,7 @@ static void set_goal(jl_cgimm *cg, int j)
 
     for (i = 0; i < g->order; i++) {
         cg->goal[3 * j + i] = i < 2 ? g->steady[i] : g->steady[i] / 2;
-        cg->rate[3 * j + i] = g->k[i] > 0 ? 1 - jl_exp(-1 / g->k[i]) : 1;
+        cg->rate[3 * j + i] = rate_of(g->k[i]);
     }
 }
 
@@ -47,11 +52,22 @@ static void start(jl_cgimm *cg, const jl_real *mu)
 
     for (j = 0; j < M; j++) {
         cg->mu[j] = mu != NULL ? mu[j] : 1 / (jl_real)M;
-        cg->weight[j] = JLI_WEIGHTS * cg->mu[j];
         jl_cgimm_restart(cg, j);
     }
-    jli_cg_unweighed(cg, JLI_WEIGHTS);
+    jli_cg_weights_are_mu(cg);
+    cg->best = -1;
+    cg->diverged = 0;
     jl_cgimm_combine(cg);
+}
+
+/* 1 if 1 - alpha is more than rounding, in the end and from the first
+ * measurement on: S = R / (1 - alpha). */
+static int leaves_one(const jl_cg_gains *g)
+{
+    const jl_real start = g->start[0], steady = g->steady[0];
+    const jl_real first = start + rate_of(g->k[0]) * (steady - start);
+
+    return 1 - steady >= 2 * JL_EPSILON && 1 - first >= 2 * JL_EPSILON;
 }
 
 static int check_gains(const jl_cg_gains *g)
@@ -70,7 +86,7 @@ static int check_gains(const jl_cg_gains *g)
     for (i = 0; i < g->order; i++)
         if (g->start[i] < 0 || !(g->k[i] >= 0 && g->k[i] <= JL_C(1e6)))
             return JL_ERANGE;
-    return JL_OK;
+    return leaves_one(g) ? JL_OK : JL_ERANGE;
 }
 
 int jl_cgimm_init(jl_cgimm *cg, int M, const jl_cg_gains *gains, int axes,

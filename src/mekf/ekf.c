@@ -6,13 +6,14 @@
 int jl_ekf_init(jl_ekf *filter, const jl_mekf_model *model, const jl_real *Q,
                 const jl_real *R, jl_real *mem, int cap, jl_real *scratch)
 {
-    int n = model->n, N = n + model->m, r = model->r, i, status;
-    int p = model->p1 + model->p2;
+    int r = model->r, N, p, i, status;
 
     status = jli_mekf_check(model, Q, R, scratch);
     if (status != JL_OK)
         return status;
-    if (cap < JL_EKF_STATE(n, model->m, r, model->p1, model->p2))
+    N = model->n + model->m;
+    p = model->p1 + model->p2;
+    if (cap < JL_EKF_STATE(model->n, model->m, r, model->p1, model->p2))
         return JL_ENOMEM;
     filter->model = model;
     filter->x = mem;

@@ -6,7 +6,7 @@
 int jli_mekf_check(const jl_mekf_model *model, const jl_real *Q,
                    const jl_real *R, jl_real *scratch)
 {
-    int p = model->p1 + model->p2, status;
+    int status;
 
     if (model->n < 1 || model->m < 1 || model->n > JL_MAX_STATES
         || model->m > JL_MAX_STATES - model->n
@@ -15,7 +15,7 @@ int jli_mekf_check(const jl_mekf_model *model, const jl_real *Q,
         || model->p2 < 0 || model->p2 > JL_MAX_STATES - model->p1
         || model->f == NULL || model->c == NULL || model->G == NULL)
         return JL_EDIM;
-    status = jl_mat_check_cov(Q, scratch, p);
+    status = jl_mat_check_cov(Q, scratch, model->p1 + model->p2);
     return status != JL_OK ? status
         : jl_mat_check_cov(R, scratch, model->r);
 }
@@ -49,12 +49,13 @@ int jl_mekf_init(jl_mekf *filter, const jl_mekf_model *model,
                  const jl_real *Q, const jl_real *R, jl_real *mem, int cap,
                  jl_real *scratch)
 {
-    int n = model->n, N = n + model->m, r = model->r, i, status;
-    int p = model->p1 + model->p2;
+    int n = model->n, r = model->r, N, p, i, status;
 
     status = jli_mekf_check(model, Q, R, scratch);
     if (status != JL_OK)
         return status;
+    N = n + model->m;
+    p = model->p1 + model->p2;
     if (cap < JL_MEKF_STATE(n, model->m, r, model->p1, model->p2))
         return JL_ENOMEM;
     memset(filter, 0, sizeof *filter);

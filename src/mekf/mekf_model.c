@@ -19,7 +19,7 @@ static void put(jl_real *A, int width, const jl_real *B, int rows, int cols)
         jli_copy(A + i * width, B + i * cols, cols);
 }
 
-/* --- functions of one vector, for differences ----------------------------- */
+/* --- functions of one vector, for differences ---------------------------- */
 
 struct part {
     const jl_mekf_model *model;
@@ -36,7 +36,7 @@ static int fx(jl_real *out, const jl_real *y, void *context)
 
     status = model->f(zeros(part->matrix, n * n), y, model->context);
     jli_apply(out, part->matrix, part->x, NULL, n, n);
-    return status;
+    return jli_checked(status, part->matrix, n * n);
 }
 
 /* h(x, y) of [x; y] */
@@ -53,14 +53,13 @@ static int cx(jl_real *out, const jl_real *at, void *context)
 {
     const struct part *part = context;
     const jl_mekf_model *model = part->model;
-    int n = model->n, r = model->r, status;
+    int status = jli_mekf_c(part->matrix, model, at, at + model->n);
 
-    status = model->c(zeros(part->matrix, r * n), at, at + n, model->context);
-    jli_apply(out, part->matrix, at, NULL, r, n);
+    jli_apply(out, part->matrix, at, NULL, model->r, model->n);
     return status;
 }
 
-/* --- the state's motion ---------------------------------------------------- */
+/* --- the state's motion -------------------------------------------------- */
 
 static int move_x(jl_real *xp, jl_real *F, const jl_mekf_model *model,
                   const jl_real *x, const jl_real *y, jl_real *scratch)
@@ -106,9 +105,8 @@ static int move_y(jl_real *yp, jl_real *J, const jl_mekf_model *model,
     return jli_checked(status, J, m * (n + m));
 }
 
-/* xp, F at x, y; scratch [max(n N + 2 n + m, 2 N + 2 m)] */
-static int move(struct jli_linear *l, const jl_mekf_model *model,
-                const jl_real *x, const jl_real *y, jl_real *scratch)
+int jli_mekf_move(struct jli_linear *l, const jl_mekf_model *model,
+                  const jl_real *x, const jl_real *y, jl_real *scratch)
 {
     int n = model->n, m = model->m, status;
     jl_real *at = scratch;
@@ -124,9 +122,8 @@ static int move(struct jli_linear *l, const jl_mekf_model *model,
     return jl_vec_within(l->xp, n + m, JL_LARGE) ? JL_OK : JL_ENONFINITE;
 }
 
-/* G at x, y; scratch [N p] */
-static int drive(struct jli_linear *l, const jl_mekf_model *model,
-                 const jl_real *x, const jl_real *y, jl_real *scratch)
+int jli_mekf_drive(struct jli_linear *l, const jl_mekf_model *model,
+                   const jl_real *x, const jl_real *y, jl_real *scratch)
 {
     int n = model->n, m = model->m, p1 = model->p1, p2 = model->p2, status;
     int p = p1 + p2, all = n * p1 + m * p;
@@ -140,7 +137,7 @@ static int drive(struct jli_linear *l, const jl_mekf_model *model,
     return jli_checked(status, G1, all);
 }
 
-/* --- what is measured ------------------------------------------------------ */
+/* --- what is measured ---------------------------------------------------- */
 
 int jli_mekf_c(jl_real *c, const jl_mekf_model *model, const jl_real *x,
                const jl_real *y)
@@ -160,9 +157,8 @@ void jli_mekf_innovate(jl_real *nu, const jl_real *z, const jl_real *c,
         nu[i] = z[i] - nu[i];
 }
 
-/* c, H at xp; scratch [N + r n + 2 r] */
-static int sense(struct jli_linear *l, const jl_mekf_model *model,
-                 jl_real *scratch)
+int jli_mekf_sense(struct jli_linear *l, const jl_mekf_model *model,
+                   jl_real *scratch)
 {
     const jl_real *xp = l->xp;
     int n = model->n, N = n + model->m, r = model->r, status;
@@ -180,7 +176,7 @@ static int sense(struct jli_linear *l, const jl_mekf_model *model,
     return jli_checked(status, l->H, r * N);
 }
 
-/* --- all of it ------------------------------------------------------------- */
+/* --- all of it ----------------------------------------------------------- */
 
 int jli_mekf_linearise(struct jli_linear *l, jl_real *mem,
                        const jl_mekf_model *model, const jl_real *xhat,
@@ -198,11 +194,11 @@ int jli_mekf_linearise(struct jli_linear *l, jl_real *mem,
     l->nu = l->xp + N;
     if (z != NULL && !jl_vec_within(z, r, JL_LARGE))
         return JL_ENONFINITE;
-    status = move(l, model, xhat, ybar, scratch);
+    status = jli_mekf_move(l, model, xhat, ybar, scratch);
     if (status == JL_OK)
-        status = drive(l, model, xbar, ybar, scratch);
+        status = jli_mekf_drive(l, model, xbar, ybar, scratch);
     if (status == JL_OK && z != NULL)
-        status = sense(l, model, scratch);
+        status = jli_mekf_sense(l, model, scratch);
     if (status == JL_OK && z != NULL)
         jli_mekf_innovate(l->nu, z, l->c, l->xp, n, r);
     return status;

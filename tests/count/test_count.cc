@@ -169,7 +169,7 @@ struct count sum_of(const struct step &s)
 
 void test_count_cgimm_step_is_cheap(void **)
 {
-    for (int k = 3; k < 40; k++) {              // gains have settled
+    for (int k = 3; k < 400; k++) {             // gains have settled
         const struct count is = count_cgimm(k, 0).whole;
 
         assert_in_range(is.products, 1, 24);

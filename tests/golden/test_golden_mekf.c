@@ -5,11 +5,11 @@
 
 /* How far off each may be; measured are, over all cases of a kind,
  *             double                              float
- *     MEKF    1.2e-13 max(1, |x|), var 1.4e-14    8.8e-5, 9.7e-6
- *     stress  6.6e-10 sigma,       var 1.1e-12    0.97 sigma, 7.7e-4
+ *     MEKF    1.6e-13 max(1, |x|), var 1.7e-14    1.1e-4, 9.9e-6
+ *     stress  9.1e-10 sigma,       var 6.1e-13    0.23 sigma, 3.5e-4
  *     EKF     4.1e-14 max(1, |x|), var 1.2e-14    2.8e-5, 4.0e-6
  * and with derivatives by differences
- *     MEKF    2.8e-9  max(1, |x|), var 3.5e-10    8.0e-4, 1.3e-4
+ *     MEKF    2.3e-9  max(1, |x|), var 3.2e-10    1.0e-3, 1.4e-4
  * The plain EKF is not accurate on the stress cases: test_mekf_traps.c. */
 #if JL_REAL_FLOAT
 #define STATE 5e-4
@@ -145,12 +145,32 @@ static void test_ekf_meets_reference(void **state)
     }
 }
 
+static void test_zoo_refuses(void **state)
+{
+    struct mekf_zoo zoo;
+    jl_mekf_model model, before;
+
+    (void)state;
+    memset(&zoo, 0, sizeof zoo);
+    memset(&model, 1, sizeof model);
+    before = model;
+    assert_int_equal(mekf_zoo_model(&model, "ar2", &zoo), -1);
+    assert_int_equal(mekf_zoo_model(&model, "spring2", &zoo), -1);
+    zoo.r = ZOO_R + 1;
+    assert_int_equal(mekf_zoo_model(&model, "spring2", &zoo), -1);
+    assert_same_bits(&model, &before, sizeof model);
+    zoo.r = ZOO_R;
+    assert_int_equal(mekf_zoo_model(&model, "spring2", &zoo), 0);
+    assert_int_equal(model.r, ZOO_R);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_mekf_meets_reference),
         cmocka_unit_test(test_mekf_by_differences),
         cmocka_unit_test(test_ekf_meets_reference),
+        cmocka_unit_test(test_zoo_refuses),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

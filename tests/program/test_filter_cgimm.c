@@ -307,6 +307,29 @@ static void test_filter_cgimm_bad_data(void **state)
     check_ended(&ran, "huge.csv:3: the step fails");
 }
 
+/* One row in twelve: mode 1's errors grow; on PEs as in one process. */
+static void test_filter_cgimm_diverges(void **state)
+{
+    enum { ROWS = 6000 };
+    static char text[16 * ROWS];
+    const char *model = scratch_write("designed.json", designed), *data;
+    int k, used = sprintf(text, "k,z0,z1\n");
+    char *serial;
+
+    (void)state;
+    for (k = 0; k < ROWS; k++)
+        used += sprintf(text + used, k % 12 == 0 ? "%d,5,7\n" : "%d,,\n", k);
+    data = scratch_write("sparse.csv", text);
+    run_jumplink("filter", model, data);
+    check_ended(&ran, "the step fails: number not finite");
+    assert_null(strstr(ran.out, "nan"));
+    serial = strdup(ran.out);
+    run_jumplink("filter", model, data, "--pes", "2", "--port", "threads");
+    check_ended(&ran, "the step fails: number not finite");
+    check_same_text(serial, ran.out);
+    free(serial);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -318,6 +341,7 @@ int main(void)
         cmocka_unit_test(test_filter_cgimm_bad_models),
         cmocka_unit_test(test_filter_cgimm_refuses_what_it_cannot),
         cmocka_unit_test(test_filter_cgimm_bad_data),
+        cmocka_unit_test(test_filter_cgimm_diverges),
     };
 
     return cmocka_run_group_tests(tests, scratch_setup, scratch_teardown);

@@ -274,8 +274,8 @@ static void test_manoeuvre_says_what_does_not_hold(void **state)
 static void test_manoeuvre_wrong_use(void **state)
 {
     (void)state;
-    run_jumplink("sim", "--scenario", "turn");
-    check_refused(&ran, 2, "--scenario turn|manoeuvre1d");
+    run_jumplink("sim", "--scenario", "bend");
+    check_refused(&ran, 2, "--scenario bend|manoeuvre1d");
     run_jumplink(SCENARIO, "--runs", "1");
     check_refused(&ran, 2, "--runs 1: must be a whole number from 2");
     run_jumplink(SCENARIO, "--seed", "-3");

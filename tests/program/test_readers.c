@@ -427,8 +427,8 @@ static void test_model_mistakes_of_json(void **state)
         { "\"m\": 2", "\"n\": 2", "bad.json:1: ", "uplicate" },
         { "\"kind\": \"imm\"", "\"kind\": 3", "json: kind: ", "a number" },
         { "\"kind\": \"imm\",", "", "json: kind: ", "missing" },
-        { "\"imm\"", "\"mekf\"", "json: kind: ",
-          "'mekf' is not supported by this version" },
+        { "\"imm\"", "\"particle\"", "json: kind: ",
+          "'particle' is not supported by this version" },
         { "\"imm\"", "\"imm2\"", "json: kind: ", "'imm2' is unknown" },
         { NULL, NULL, NULL, NULL }
     };
