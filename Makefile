@@ -189,7 +189,7 @@ run-tests: $(TESTS) $(PROGRAMS) lib
 	    $(sort $(TESTS)) tests/check/test_mixing.sh tests/check/test_readme.sh tests/check/test_examples.sh
 
 # No fork: what ThreadSanitizer watches are threads.
-run-tsan: $(foreach t,conform_loop conform_threads par_loop par_threads fault_threads,$(BUILD)/tests/test_$(t) $(BUILD)/tests_f32/test_$(t))
+run-tsan: $(foreach t,conform_loop conform_threads par_loop par_threads fold_loop fold_threads fault_threads,$(BUILD)/tests/test_$(t) $(BUILD)/tests_f32/test_$(t))
 	@sh tests/check/run_tests.sh $^
 
 # --- fuzzing -------------------------------------------------------------

@@ -40,5 +40,6 @@
 #include "jumplink/link.h"
 #include "jumplink/plan.h"
 #include "jumplink/par.h"
+#include "jumplink/fold.h"
 
 #endif

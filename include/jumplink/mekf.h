@@ -100,7 +100,7 @@ typedef struct jl_mekf {
      + ((p1) + (p2)) * ((p1) + (p2)) + (r) * (r))
 #define JL_MEKF_SCRATCH(n, m, r, p1, p2) \
     (JL_MEKF_ARRAY(n, m, r, p1, p2) + JL_MEKF_ARRAY_B(n, m, r, p1) \
-     + JL_MEKF_LINEAR(n, m, r, p1, p2) + ((r) + 1) * (n) \
+     + JL_MEKF_LINEAR(n, m, r, p1, p2) + ((r) + 1) * (n) + (r) \
      + ((p1) + (p2)) * ((p1) + (p2)))
 
 /* ... of which: the arrays of A and of B that are made triangular (the latter

@@ -123,6 +123,10 @@
 #define jl_par_serve jl_par_serve_f32
 #define jl_par_step jl_par_step_f32
 #define jl_par_ahead jl_par_ahead_f32
+#define jl_fold_deal jl_fold_deal_f32
+#define jl_fold_init jl_fold_init_f32
+#define jl_fold_step jl_fold_step_f32
+#define jl_fold_stop jl_fold_stop_f32
 #endif
 
 #endif

@@ -11,7 +11,7 @@
 #define JLI_FEW (JL_REAL_MIN / JL_EPSILON)
 #define JLI_MAGNIFY (JL_EPSILON / JL_REAL_MIN)
 
-/* |(r, x)| of tiny numbers; *c, *s as in jli_givens. */
+/* |(r, x)| of tiny numbers; *c, *s as in jli_givens_some. */
 JL_INLINE jl_real jli_tiny_rotation(jl_real *c, jl_real *s, jl_real r,
                                     jl_real x)
 {
@@ -25,16 +25,18 @@ JL_INLINE jl_real jli_tiny_rotation(jl_real *c, jl_real *s, jl_real r,
     return length / JLI_MAGNIFY;
 }
 
-/* Column by column, and down each: what a row meets, and in which order, is
- * what it meets in a triangle of cells that is fed row by row (Gentleman, Kung
- * 1981, Matrix Triangularization by Systolic Arrays).
+/* The first `pivots` columns, and down each: what a row meets, and in which
+ * order, is what it meets in a triangle of cells that is fed row by row
+ * (Gentleman, Kung 1981, Matrix Triangularization by Systolic Arrays).  So the
+ * first pivots, and then the others on the rows and columns that are left, give
+ * the bits of all at once.
  * A rotation takes (r, x) to (r', 0): c = r / r', s = x / r'.  r'^2 is kept
  * beside r', so that the next rotation's root need not wait for this one's. */
-JL_INLINE void jli_givens(jl_real *A, int rows, int cols)
+JL_INLINE void jli_givens_some(jl_real *A, int pivots, int rows, int cols)
 {
     int i, j, k;
 
-    for (j = 0; j < rows && j < cols; j++) {
+    for (j = 0; j < pivots; j++) {
         jl_real *top = A + j * cols;
         jl_real r = top[j], sum = r * r;
 
@@ -67,6 +69,11 @@ JL_INLINE void jli_givens(jl_real *A, int rows, int cols)
             for (k = j; k < cols; k++)
                 top[k] = -top[k];
     }
+}
+
+JL_INLINE void jli_givens(jl_real *A, int rows, int cols)
+{
+    jli_givens_some(A, rows < cols ? rows : cols, rows, cols);
 }
 
 #endif

@@ -20,7 +20,7 @@ int jli_par_fault(jl_par *par, int pe, int status)
 /* Of all messages that do not come, the first that could have come is the one
  * whose sender is to blame.  Its receiver must have the time to say so before
  * those who wait for later ones lose patience. */
-static long patience(long timeout_us, int level)
+long jli_patience(long timeout_us, int level)
 {
     long more = timeout_us / 8;
 
@@ -49,7 +49,7 @@ int jli_par_send(jl_par *par, int pe, const unsigned char *msg, int len,
                  long timeout_us, int level)
 {
     int status = jl_chan_send(channel(par, pe, 1), msg, len,
-                              patience(timeout_us, level));
+                              jli_patience(timeout_us, level));
 
     if (status == JL_OK)
         return JL_OK;
@@ -62,7 +62,7 @@ int jli_par_send(jl_par *par, int pe, const unsigned char *msg, int len,
 int jli_par_recv(jl_par *par, int pe, long timeout_us, int level)
 {
     int len = jl_chan_recv(channel(par, pe, 0), JLI_IN(par), par->cap / 2,
-                           patience(timeout_us, level));
+                           jli_patience(timeout_us, level));
 
     if (len < 0)
         return jli_par_fault(par, pe, len);

@@ -45,6 +45,7 @@
 #define jli_msg_fault_read jli_msg_fault_read_f32
 #define jli_par_send jli_par_send_f32
 #define jli_par_recv jli_par_recv_f32
+#define jli_patience jli_patience_f32
 #define jli_par_fault jli_par_fault_f32
 #define jli_par_tell_fault jli_par_tell_fault_f32
 #define jli_par_ready jli_par_ready_f32

@@ -69,6 +69,9 @@ int jli_par_recv(jl_par *par, int pe, long timeout_us, int level);
 
 int jli_par_fault(jl_par *par, int pe, int status);
 
+/* That deadline. */
+long jli_patience(long timeout_us, int level);
+
 /* Tell the neighbours, and PE0 the host, of the failure in *par. */
 void jli_par_tell_fault(jl_par *par);
 

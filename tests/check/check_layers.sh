@@ -21,7 +21,8 @@ pf        base mat rng model
 dropout   base mat model kf imm
 link      base wire chan
 plan      base
-par       base chan wire plan mat rng model kf imm cgimm mekf systolic pf dropout
+par       base chan wire plan mat rng model kf imm cgimm mekf systolic pf dropout fold
+fold      base chan mekf wire
 '
 
 # For every other folder, the start of the paths it may include.

@@ -24,7 +24,7 @@ listed() {
 listed . "$planned ${ignored:-build}"
 listed src "$topics"
 listed include 'jumplink.h jumplink'
-listed include/jumplink "config.h names.h kf_sizes.def givens_sizes.def $(for t in $topics; do printf '%s.h ' "$t"; done)"
+listed include/jumplink "config.h names.h fold.h kf_sizes.def givens_sizes.def $(for t in $topics; do printf '%s.h ' "$t"; done)"
 listed port "$ports"
 listed tests "$tests"
 
