@@ -6,6 +6,7 @@
 #include "options.h"
 #include "run_file.h"
 
+/* In two, as C promises no longer texts. */
 static const char help[] =
     "usage: jumplink filter MODEL.json DATA.csv [OPTIONS]\n"
     "Runs a filter over the measurements in a file and writes its\n"
@@ -19,7 +20,8 @@ static const char help[] =
     "                    of those accepted so far; rejected by the gate\n"
     "                    (0, 1); nan: not in this row\n"
     "  --truth A,-,B,..  ... and nees = e' P^-1 e, for data whose columns A,\n"
-    "                    B,.. are the true state, in its order; -: unknown\n"
+    "                    B,.. are the true state, in its order; -: unknown\n";
+static const char more_help[] =
     COMMON_HELP
     "  --spread          of kind mekf: filter B's predicted covariance also\n"
     "                    has what not knowing the parameters does to x\n"
@@ -61,6 +63,7 @@ int cmd_filter(int argc, char **argv)
     while ((c = getopt_long(argc, argv, SHORT_OPTIONS, known, NULL)) != -1) {
         if (c == 'h') {
             fputs(help, stdout);
+            fputs(more_help, stdout);
             return 0;
         }
         if (c == 2001)

@@ -134,7 +134,8 @@ static void put_runs(const struct rivals *r, FILE *out)
                 for (q = 0; q < QUANTITIES; q++) {
                     const struct rivals_error *e = &r->run[i].of[s][f][q];
 
-                    fprintf(out, ",%.9g,%.9g,%.9g", e->rms, e->final, e->mean);
+                    fprintf(out, ",%.17g,%.17g,%.17g", e->rms, e->final,
+                            e->mean);
                 }
             fputc('\n', out);
         }

@@ -104,6 +104,16 @@ static void check_rms(const char *name, int situation, int rival, int quantity,
     assert_true(rms.error < 1.5 * error && rms.error > error / 1.5);
 }
 
+static void check_mean(int situation, int rival, int quantity, double want,
+                       double error)
+{
+    struct rivals_figure mean = rivals_mean(of("spring2"), situation, rival,
+                                            quantity);
+
+    assert_close(mean.value, want, 4 * sqrt(2) * error);
+    assert_true(mean.error < 1.5 * error && mean.error > error / 1.5);
+}
+
 /* Of the same simulation: errors themselves. */
 static void test_rivals_errors_agree(void **state)
 {
@@ -116,6 +126,8 @@ static void test_rivals_errors_agree(void **state)
     check_rms("turn", AS_MODELLED, RIVAL_MEKF, OF_STATE, 26.883, 0.46);
     check_rms("turn", AS_MODELLED, RIVAL_SPREAD, OF_STATE, 10.287, 0.10);
     check_rms("turn", TOO_NOISY, RIVAL_MEKF, OF_PARAMETER, 0.018027, 0.00023);
+    check_mean(AS_MODELLED, RIVAL_MEKF, OF_STATE, 0.01433, 0.00047);
+    check_mean(TOO_SURE, RIVAL_EKF, OF_PARAMETER, -0.8227, 0.0046);
 }
 
 /* --- verdicts ------------------------------------------------------------ */
