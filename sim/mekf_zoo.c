@@ -113,12 +113,12 @@ struct turn {
 
 static int turn_by(struct turn *t, jl_real a)
 {
-    jl_real s, c, sinc, aa = a * a;
-    int status = jl_sincos(&s, &c, a / 2);
+    jl_real s, c, sinc, aa = a * a, half = a / 2;
+    int status = jl_sincos(&s, &c, half);
 
     if (status != JL_OK)
         return status;
-    sinc = a < 0 || a > 0 ? s / (a / 2) : 1;
+    sinc = half < 0 || half > 0 ? s / half : 1;
     t->sine = 2 * s * c;
     t->cosine = 1 - 2 * s * s;
     t->S = sinc * c;

@@ -20,17 +20,32 @@ int jli_mekf_check(const jl_mekf_model *model, const jl_real *Q,
         : jl_mat_check_cov(R, scratch, model->r);
 }
 
-/* U [n,n] upper, diagonal >= 0, U'U = A.  By pivots, so that a singular A gets
- * rows of zeros and not the roots of rounding.  scratch [n n + 2 n] */
+/* Whether what row i of the factors S adds to A is A's rounding. */
+static int is_rounding(const jl_real *S, const jl_real *A, int i, int n)
+{
+    jl_real d = S[i * (n + 1)], most = 2 * (jl_real)n * JL_EPSILON;
+    int j;
+
+    if (d > most * A[i * (n + 1)])
+        return 0;
+    for (j = i + 1; j < n; j++)
+        if (d * S[i * n + j] * S[i * n + j] > most * A[j * (n + 1)])
+            return 0;
+    return 1;
+}
+
+/* U [n,n] upper, diagonal >= 0, U'U = A.  By pivots, and a singular A gets
+ * rows of zeros and not the roots of rounding, which would make a singular V
+ * look regular.  scratch [n n + 2 n] */
 static void factor(jl_real *U, const jl_real *A, jl_real *scratch, int n)
 {
     int i, j;
 
     jl_mat_ud(U, A, scratch, n);
     for (i = 0; i < n; i++) {
-        jl_real root = jli_sqrt(U[i * n + i]);
+        jl_real root = is_rounding(U, A, i, n) ? 0 : jli_sqrt(U[i * (n + 1)]);
 
-        U[i * n + i] = root;
+        U[i * (n + 1)] = root;
         for (j = i + 1; j < n; j++)
             U[i * n + j] *= root;
     }

@@ -164,6 +164,23 @@ static void test_zoo_refuses(void **state)
     assert_int_equal(model.r, ZOO_R);
 }
 
+/* Half the angle of the least number is 0. */
+static void test_zoo_turns_by_the_least(void **state)
+{
+    const jl_real least = JL_REAL_MIN * JL_EPSILON;
+    struct mekf_zoo zoo;
+    jl_mekf_model model;
+    jl_real f[16] = { 0 };
+
+    (void)state;
+    memset(&zoo, 0, sizeof zoo);
+    zoo.T = 1;
+    assert_true(least > 0 && least / 2 == 0);
+    assert_int_equal(mekf_zoo_model(&model, "ct4pos", &zoo), 0);
+    assert_int_equal(model.f(f, &least, model.context), JL_OK);
+    assert_true(f[1] == 1 && f[5] == 1 && f[11] == 1 && f[15] == 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -171,6 +188,7 @@ int main(void)
         cmocka_unit_test(test_mekf_by_differences),
         cmocka_unit_test(test_ekf_meets_reference),
         cmocka_unit_test(test_zoo_refuses),
+        cmocka_unit_test(test_zoo_turns_by_the_least),
     };
 
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -498,7 +498,7 @@ static void test_mekf_semidefinite(void **state)
     check_factor(rig.f.U, 5);
     for (i = 1; i < 5; i++)
         for (j = i; j < 5; j++)
-            assert_close(rig.f.U[i * 5 + j], 0, 20 * (double)sqrt(JL_EPSILON));
+            assert_true(rig.f.U[i * 5 + j] == 0);
     assert_int_equal(step(&rig, rig.z), JL_OK);
     rig_close(&rig);
 }
@@ -751,6 +751,7 @@ static void test_mekf_refuses_large_deviations(void **state)
 struct rows {
     int r;
     jl_real c[3 * 3];
+    jl_real v[3];               /* R = v v' */
 };
 
 static int rows_f(jl_real *f, const jl_real *y, void *context)
@@ -781,7 +782,7 @@ static int rows_G(jl_real *G1, jl_real *G2, jl_real *G3, const jl_real *x,
     return JL_OK;
 }
 
-/* A step with measurements c, R = 0 but for R_rr = last; random scales. */
+/* A step with measurements c, R = v v', and R_rr more by last. */
 static int step_of_rows(const struct rows *rows, jl_real last, jl_real scale)
 {
     static jl_real mem[JL_MEKF_STATE(3, 1, 3, 1, 0)];
@@ -803,7 +804,9 @@ static int step_of_rows(const struct rows *rows, jl_real last, jl_real scale)
     model.context = (void *)(uintptr_t)rows;
     for (i = 0; i < 4; i++)
         P[i * 5] = scale * (jl_real)(i + 1);
-    R[rows->r * rows->r - 1] = last;
+    for (i = 0; i < rows->r * rows->r; i++)
+        R[i] = rows->v[i / rows->r] * rows->v[i % rows->r];
+    R[rows->r * rows->r - 1] += last;
     assert_int_equal(jl_mekf_init(&f, &model, Q, R, mem,
                                   (int)(sizeof mem / sizeof *mem), scratch),
                      JL_OK);
@@ -817,9 +820,10 @@ static int step_of_rows(const struct rows *rows, jl_real last, jl_real scale)
 
 static void test_mekf_singular(void **state)
 {
-    const struct rows nothing = { 1, { 0 } };
-    const struct rows one = { 1, { 1, 2, 3 } };
-    struct rows same = { 2, { 0 } }, sum = { 3, { 0 } };
+    const struct rows nothing = { 1, { 0 }, { 0 } };
+    const struct rows one = { 1, { 1, 2, 3 }, { 0 } };
+    struct rows same = { 2, { 0 }, { 0 } }, sum = { 3, { 0 }, { 0 } };
+    struct rows noise = { 2, { 0 }, { 0 } };
     int i, k;
 
     (void)state;
@@ -836,7 +840,12 @@ static void test_mekf_singular(void **state)
             sum.c[i] = scatter(i, k, 14);
             sum.c[3 + i] = scatter(i, k, 15);
             sum.c[6 + i] = sum.c[i] - sum.c[3 + i];
+            noise.v[i] = scatter(i, k, 16);
         }
+        noise.r = 2 + k % 2;                    /* noise alone, of rank 1 */
+        assert_int_equal(step_of_rows(&noise, 0, scale), JL_ESINGULAR);
+        noise.r = 2;
+        assert_int_equal(step_of_rows(&noise, 1, scale), JL_OK);
         assert_int_equal(step_of_rows(&same, 0, scale), JL_ESINGULAR);
         assert_int_equal(step_of_rows(&same, scale, scale), JL_OK);
         assert_int_equal(step_of_rows(&sum, 0, scale), JL_ESINGULAR);
