@@ -249,7 +249,8 @@ int cmd_systolic(int argc, char **argv)
     const char *folder = "build/systolic";
     int c, way = BEST, count = 0, status;
 
-    while ((c = getopt_long(argc, argv, "o:h", known, NULL)) != -1)
+    opterr = 0;                         /* said below, in one line */
+    while ((c = getopt_long(argc, argv, ":o:h", known, NULL)) != -1)
         switch (c) {
         case 'h':
             fputs(help, stdout);
@@ -267,8 +268,10 @@ int cmd_systolic(int argc, char **argv)
                 return misuse("systolic", "--schedule %s: paper, naive, best "
                               "or mixed", optarg);
             break;
+        case ':':
+            return misuse("systolic", "%s needs a value", argv[optind - 1]);
         default:
-            return misuse("systolic", "see jumplink systolic --help");
+            return misuse("systolic", "unknown option %s", argv[optind - 1]);
         }
     if (optind < argc)
         return misuse("systolic", "takes no files, but was given %s",

@@ -121,6 +121,10 @@ static void test_systolic_refuses(void **state)
     check_refused(&ran, 2, "--schedule worst");
     run_jumplink("systolic", "model.json");
     check_refused(&ran, 2, "model.json");
+    run_jumplink("systolic", "--sise", "3,2,2");
+    check_refused(&ran, 2, "unknown option --sise");
+    run_jumplink("systolic", "--size");
+    check_refused(&ran, 2, "--size needs a value");
     run_jumplink("systolic", "-o", "/dev/null/x");
     check_refused(&ran, 1, "/dev/null");
 }
