@@ -13,13 +13,15 @@
 #include "systolic_run.h"
 
 static const char help[] =
-    "usage: jumplink systolic [--size N,M,R].. [--schedule NAME] [-o DIR]\n"
+    "usage: jumplink systolic [--n N --m M --r R] [--schedule NAME] [-o DIR]\n"
+    "       jumplink systolic [--size N,M,R].. [--schedule NAME] [-o DIR]\n"
     "The modified extended Kalman filter on a systolic array of N states, M\n"
     "parameters, R measurements (default: six sizes): cells, ticks of a step\n"
     "with each schedule, utilisation, how far its estimates are from the\n"
     "filter's; and of the first size (of the default ones, of 3,2,2) what\n"
     "every cell does in every tick.\n\n"
-    "  --size N,M,R      1 to 16 each; may be given several times\n"
+    "  --n N --m M --r R  a size; 1 to 16 each\n"
+    "  --size N,M,R      the same; may be given several times\n"
     "  --schedule paper|naive|best|mixed  of what is drawn (default best;\n"
     "                    jumplink/systolic.h)\n"
     "  -o, --out DIR     where results go (default build/systolic):\n"
@@ -228,6 +230,15 @@ static int take_size(struct size *size, const char *text)
         && size->r >= 1 && size->r <= MOST ? 0 : -1;
 }
 
+/* One number of --n, --m, --r.  Returns 0, or -1. */
+static int take_number(int *number, const char *text)
+{
+    char end;
+
+    return sscanf(text, "%d%c", number, &end) == 1 && *number >= 1
+        && *number <= MOST ? 0 : -1;
+}
+
 static int take_schedule(int *way, const char *name)
 {
     for (*way = 0; *way < CONSTANT; (*way)++)
@@ -240,11 +251,15 @@ int cmd_systolic(int argc, char **argv)
 {
     static const struct option known[] = {
         { "size", required_argument, NULL, 1 },
+        { "n", required_argument, NULL, 'n' },
+        { "m", required_argument, NULL, 'm' },
+        { "r", required_argument, NULL, 'r' },
         { "schedule", required_argument, NULL, 2 },
         { "out", required_argument, NULL, 'o' },
         { "help", no_argument, NULL, 'h' }, { 0 }
     };
     static struct size sizes[SIZES_MAX];
+    struct size one = { .n = 0 };
     const struct size *drawn;
     const char *folder = "build/systolic";
     int c, way = BEST, count = 0, status;
@@ -263,6 +278,13 @@ int cmd_systolic(int argc, char **argv)
                 return misuse("systolic", "--size %s: three numbers from 1 to "
                               "%d, at most %d times", optarg, MOST, SIZES_MAX);
             break;
+        case 'n':
+        case 'm':
+        case 'r':
+            if (take_number(c == 'n' ? &one.n : c == 'm' ? &one.m : &one.r,
+                            optarg) != 0)
+                return misuse("systolic", "--%c %s: 1 to %d", c, optarg, MOST);
+            break;
         case 2:
             if (take_schedule(&way, optarg) != 0)
                 return misuse("systolic", "--schedule %s: paper, naive, best "
@@ -276,6 +298,12 @@ int cmd_systolic(int argc, char **argv)
     if (optind < argc)
         return misuse("systolic", "takes no files, but was given %s",
                       argv[optind]);
+    if (one.n + one.m + one.r > 0) {
+        if (one.n == 0 || one.m == 0 || one.r == 0 || count > 0)
+            return misuse("systolic", "--n, --m and --r go together, without "
+                          "--size");
+        sizes[count++] = one;
+    }
     drawn = sizes;
     if (count == 0) {
         drawn = &sizes[1];

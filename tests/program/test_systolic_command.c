@@ -67,8 +67,8 @@ static void test_systolic_activity(void **state)
     long work = 0, ticks, before = -1, tick_before = 0, first = 0, last = 0;
 
     (void)state;
-    run_jumplink("systolic", "--size", "4,2,2", "--schedule", "naive", "-o",
-                 folder);
+    run_jumplink("systolic", "--n", "4", "--m", "2", "--r", "2", "--schedule",
+                 "naive", "-o", folder);
     check_good(&ran);
     snprintf(path, sizeof path, "%s/counts.csv", folder);
     csv = program_file(path);
@@ -117,6 +117,10 @@ static void test_systolic_refuses(void **state)
         run_jumplink("systolic", "--size", sizes[i]);
         check_refused(&ran, 2, "--size|three numbers");
     }
+    run_jumplink("systolic", "--n", "3", "--m", "2");
+    check_refused(&ran, 2, "--n, --m and --r go together");
+    run_jumplink("systolic", "--n", "3", "--m", "0", "--r", "2");
+    check_refused(&ran, 2, "--m 0: 1 to 16");
     run_jumplink("systolic", "--schedule", "worst");
     check_refused(&ran, 2, "--schedule worst");
     run_jumplink("systolic", "model.json");
