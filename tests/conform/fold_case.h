@@ -363,8 +363,9 @@ static int fold_counted(const struct fold_shape *s, const struct fold_pe *t)
 }
 
 /* The life of a PE; to, from [npe].  0 if all was well. */
-static int fold_pe(struct fold_pe *t, int pe, const struct fold_shape *s,
-                   jl_chan **to, jl_chan **from)
+static inline int fold_pe(struct fold_pe *t, int pe,
+                          const struct fold_shape *s, jl_chan **to,
+                          jl_chan **from)
 {
     jl_fold_config config = { 0 };
     jl_real z[FOLD_R];
